@@ -1,0 +1,42 @@
+/* What the .mesh, .ff and .rad headers have in common, and the ids. */
+#ifndef TWOPASS_CACHE_H
+#define TWOPASS_CACHE_H
+
+#include "../lib/err.h"
+#include "../lib/model.h"
+#include "container.h"
+
+#define CACHE_VERSION "1"
+
+/* Strings are owned (malloc) and may be NULL. */
+struct cache_info {
+	char *history;         /* commands, one per line */
+	char *options;         /* the tool's options as a JSON object */
+	char *report;          /* what was modelled, counts, errors, as JSON */
+	char *key;             /* digest of inputs and options: equal keys, equal output */
+	char geometry_id[33];  /* all that form factors depend on */
+	char material_id[33];  /* coefficients and emission */
+	char camera_id[33];    /* all cameras */
+};
+
+void cache_info_free(struct cache_info *i);
+
+/* Fills the three ids from the model. geometry_id covers vertices, triangles,
+ * elements, split trees, patches, sides modelled, lobe kind, exponents, emission
+ * exponents, which coefficients and emissions are non-zero (in any band), the
+ * assignment of materials to surfaces; not names, coefficients, bands, UVs, NORMALs. */
+void cache_ids(const struct model *m, struct cache_info *i);
+
+/* Digest of one camera (32 hex digits). */
+void cache_camera_id(const struct camera *c, char hex[33]);
+
+/* Writes / reads the info as __metadata__ strings. cache_read_info checks version. */
+int cache_write_info(struct container_writer *w, const char *format,
+                     const struct cache_info *i, struct err *e);
+int cache_read_info(const struct container *c, struct cache_info *i, struct err *e);
+
+/* 1 if `path` exists, is a whole container of this format (structure and header
+ * digest checked) and its key is `key`: then the file is touched (mtime now). */
+int cache_up_to_date(const char *path, const char *format, const char *key);
+
+#endif

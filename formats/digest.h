@@ -1,0 +1,15 @@
+/* XXH3-128 digests as 32 hex digits. */
+#ifndef TWOPASS_DIGEST_H
+#define TWOPASS_DIGEST_H
+
+#include <stddef.h>
+
+struct digest;
+
+struct digest *digest_new(void); /* NULL when out of memory */
+void digest_bytes(struct digest *d, const void *data, size_t bytes);
+void digest_string(struct digest *d, const char *s); /* with its length */
+/* Writes the digest and frees d. */
+void digest_end(struct digest *d, char hex[33]);
+
+#endif

@@ -1,0 +1,39 @@
+/* .ff files: a struct ff, written in batches of rows. Array names: ff(5). */
+#ifndef TWOPASS_FF_FILE_H
+#define TWOPASS_FF_FILE_H
+
+#include "../lib/ff.h"
+#include "cache.h"
+
+struct ff_writer;
+
+/* f64: values are float64. */
+struct ff_writer *ff_file_create(const char *path, int f64, struct err *e);
+
+/* Appends a batch: its rows, blocks, entries, arrivals and links (all indices in
+ * it relative to the batch; chains ignored) behind those written so far. */
+int ff_file_append(struct ff_writer *w, const struct ff *batch, struct err *e);
+
+/* Writes the chain table and patch range of `whole` (its rows are ignored) and
+ * the info, and finishes. Frees w in any case. */
+int ff_file_finish(struct ff_writer *w, const struct ff *whole, const struct cache_info *i,
+                   struct err *e);
+void ff_file_abandon(struct ff_writer *w);
+
+/* An open .ff; f's arrays point into the mapped file (do not ff_free it). */
+struct ff_file {
+	struct container *container;
+	struct ff f;
+	struct cache_info info;
+	uint32_t patches;          /* of the model it was made for */
+};
+
+/* Opens and checks all (digests, monotone starts, ranges against `m`, finite and
+ * non-negative values, row closure to 1e-9, link order). m may be NULL (inspect):
+ * ranges are then checked against the file's own counts. If m_info is given and
+ * geometry_id differs: "room.ff: made for another geometry; run ffcalc again". */
+int ff_file_open(const char *path, const struct model *m, const struct cache_info *m_info,
+                 struct ff_file *out, struct err *e);
+void ff_file_close(struct ff_file *f);
+
+#endif

@@ -1,0 +1,93 @@
+/* Form factors, diffuse and directional: what a .ff file holds.
+ *
+ * A ROW is a distribution of flux leaving one patch-side: where it first lands,
+ * and where it lands after each chain of ideal mirrors and clear panes.
+ * Patch-side = 2 patch + side, element-side = 2 element + side.
+ *
+ * A BLOCK of a row is what arrives by one CHAIN: the multiset of ideal events
+ * passed on the way (chain 0: none). Values are colourless fractions of the
+ * row's flux; every block keeps what left the scene (escape), what met a black
+ * back (black), what a reciprocal lobe loses (lost) and what was not followed
+ * further (cut). Light that an ideal surface sends on appears again in the
+ * block of the longer chain, so blocks are not additive: block 0 alone closes,
+ *     row_scale (sum of values + escape + black + lost + cut) = 1,
+ * and the others close against the ideal entries that feed them.
+ *
+ * A LINK belongs to a patch-side ("target") with a finite lobe and names a
+ * source of light as the target sees it: the patch-side that the light left and
+ * the chain it came by. Its rows are the directional form factors G of eq. (3)
+ * of the paper for light from that source: one about R, one about T. Links with
+ * source FF_ANY stand for a direction bin and serve sources without their own. */
+#ifndef TWOPASS_FF_H
+#define TWOPASS_FF_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "err.h"
+#include "model.h"
+
+enum { FF_ANY = 0xffffffffu, FF_NO_ROW = 0xffffffffu };
+
+enum ff_row_kind {
+	FF_DIFFUSE = 0,     /* Lambertian, one for each patch-side that can shoot */
+	FF_EMISSION = 1,    /* cos^m lobe about the normal (emission_exponent != 1) */
+	FF_REFLECTED = 2,   /* G about R for one link */
+	FF_TRANSMITTED = 3  /* G about T for one link */
+};
+
+struct ff {
+	/* Chains. Event id = ((2 material + side light arrives on) 2 + T), T = 1
+	 * straight through. Chain c passed events chain_event[i] chain_count[i]
+	 * times, i in [chain_start[c], chain_start[c+1]), ascending. */
+	size_t chains, chain_events;
+	uint64_t *chain_start;
+	uint32_t *chain_event, *chain_count;
+
+	size_t rows;
+	uint32_t *row_side;       /* patch-side the flux leaves */
+	uint8_t *row_kind;
+	uint32_t *row_samples;    /* rays or hemicube pixels spent on block 0 */
+	double *row_scale;
+	double *row_residual;     /* 1 - sum before scaling (raw closure error) */
+	double *row_error;        /* standard error of the row: root of the summed
+	                             squares over receiving patch-sides */
+	uint64_t *row_block;      /* [rows+1] first block */
+
+	size_t blocks;
+	uint32_t *block_chain;    /* chain 0 first, then ascending length */
+	uint64_t *block_start;    /* [blocks+1] first entry */
+	double *block_escape, *block_black, *block_lost, *block_cut;
+	uint64_t *block_arrival;  /* [blocks+1] first arrival */
+
+	size_t entries;
+	uint32_t *column;         /* element-side, ordered by patch-side, then element */
+	float *value;             /* one of value, value64 is NULL */
+	double *value64;
+
+	/* Mean direction of light of a block arriving at a patch-side with a lobe:
+	 * unit vector towards where it comes from. */
+	size_t arrivals;
+	uint32_t *arrival_target;
+	float *arrival_direction; /* [arrivals][3] */
+
+	size_t links;
+	uint32_t *link_target;    /* ascending; then by source, chain */
+	uint32_t *link_source;    /* patch-side or FF_ANY */
+	uint32_t *link_chain;
+	float *link_direction;    /* [links][3] mean direction to the source */
+	uint32_t *link_row;       /* [links][2] rows about R and T, or FF_NO_ROW */
+
+	/* The shard: patches [patch_begin, patch_end) leave through these rows. */
+	uint32_t patch_begin, patch_end;
+	uint32_t part, parts;     /* K/N, 1-based */
+};
+
+void ff_free(struct ff *f);
+
+static inline double ff_value(const struct ff *f, uint64_t i)
+{
+	return f->value ? (double)f->value[i] : f->value64[i];
+}
+
+#endif

@@ -1,0 +1,29 @@
+/* Floating-point pictures of named channels. */
+#ifndef TWOPASS_IMAGE_H
+#define TWOPASS_IMAGE_H
+
+#include <stddef.h>
+
+#include "err.h"
+
+struct image {
+	int width, height;
+	int channels;
+	char **name;     /* [channels], e.g. "R", "diffuse.R", "Z", "element" */
+	float *pixel;    /* [channels][height][width], row 0 at the top */
+};
+
+/* A zeroed picture whose channels carry copies of the given names. */
+int image_new(struct image *im, int width, int height, int channels,
+              const char *const *name, struct err *e);
+void image_free(struct image *im);
+
+/* Index of the channel with this name, or -1. */
+int image_channel(const struct image *im, const char *name);
+
+static inline float *image_plane(const struct image *im, int channel)
+{
+	return im->pixel + (size_t)channel * (size_t)im->height * (size_t)im->width;
+}
+
+#endif

@@ -1,0 +1,43 @@
+/* Rays against the input triangles (Embree). World coordinates at the interface;
+ * inside, float32 about the scene's centre at unit scale. */
+#ifndef TWOPASS_RAY_H
+#define TWOPASS_RAY_H
+
+#include <stdint.h>
+
+#include "err.h"
+#include "model.h"
+
+struct ray_scene;
+
+enum { RAY_MISS = 0xffffffffu };
+
+struct ray_hit {
+	uint32_t triangle;  /* input triangle, or RAY_MISS */
+	int side;           /* side of the triangle that was hit */
+	double t;           /* distance in world units along the unit direction */
+	double w[3];        /* barycentric weights of the triangle's corners */
+};
+
+/* Builds the BVH over m's input triangles, O(n log n). m must outlive it.
+ * NULL and e on failure. */
+struct ray_scene *ray_scene_new(const struct model *m, struct err *e);
+void ray_scene_free(struct ray_scene *s);
+
+/* The world distance by which origins must leave a surface (along its normal)
+ * to be safely beyond it: a few float32 steps of the whole scene. */
+double ray_offset(const struct ray_scene *s);
+
+/* Moves point x by ray_offset along n (unit normal of the side a ray leaves). */
+void ray_leave(const struct ray_scene *s, const double n[3], double x[3]);
+
+/* Nearest hit of the ray from org along unit dir, any distance > 0. */
+void ray_nearest(const struct ray_scene *s, const double org[3], const double dir[3],
+                 struct ray_hit *hit);
+
+/* 1 if anything stands between a and b (points already moved off their
+ * surfaces with ray_leave). */
+int ray_blocked(const struct ray_scene *s, const double a[3], const double b[3]);
+
+
+#endif

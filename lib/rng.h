@@ -1,0 +1,47 @@
+/* Random and low-discrepancy numbers, all functions of explicit seeds. */
+#ifndef TWOPASS_RNG_H
+#define TWOPASS_RNG_H
+
+#include <stdint.h>
+
+/* A 64-bit mix (splitmix64 finaliser, Steele et al. 2014). */
+static inline uint64_t rng_mix(uint64_t x)
+{
+	x += 0x9e3779b97f4a7c15u;
+	x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+	x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+	return x ^ (x >> 31);
+}
+
+/* A stream of uniform numbers: splitmix64. Begin with rng_seed. */
+struct rng {
+	uint64_t state;
+};
+
+static inline struct rng rng_seed(uint64_t seed, uint64_t stream)
+{
+	return (struct rng){ rng_mix(seed) ^ rng_mix(~stream * 0xd1342543de82ef95u) };
+}
+
+static inline uint64_t rng_next(struct rng *r)
+{
+	uint64_t x = r->state += 0x9e3779b97f4a7c15u;
+	x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+	x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+	return x ^ (x >> 31);
+}
+
+/* Uniform in (0, 1): never 0, never 1. */
+static inline double rng_uniform(struct rng *r)
+{
+	return ((double)(rng_next(r) >> 12) + .5) * 0x1p-52;
+}
+
+/* Coordinate `dim` (0 to 4) of point `index` of the Sobol sequence, scrambled
+ * by a nested uniform (Owen) scramble chosen by `seed`; in [0, 1) with 32 bits.
+ * Points of one seed are jointly stratified over all dimensions. Direction
+ * numbers: Joe & Kuo 2008; scramble by hashing: Laine & Karras 2011, with
+ * Burley's constants (JCGT 9(4), 2020). */
+double rng_sobol(uint32_t index, int dim, uint64_t seed);
+
+#endif
