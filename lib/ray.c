@@ -1,0 +1,199 @@
+/* The only file that knows Embree (3 or 4). */
+#include "ray.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#if defined(__has_include)
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#define EMBREE 4
+#endif
+#endif
+#ifndef EMBREE
+#include <embree3/rtcore.h>
+#define EMBREE 3
+#endif
+
+#include "mem.h"
+#include "vec3.h"
+
+struct ray_scene {
+	RTCDevice device;
+	RTCScene scene;
+	double centre[3];
+	double unit;        /* world length of one unit inside */
+	float (*normal)[3]; /* [triangles] front normals */
+};
+
+/* Origins leave surfaces by 8 float32 steps at unit scale: rounding of the
+ * vertices, of the origin and of the plane together stay below 4. */
+static const double offset_units = 0x1p-21;
+
+static void bounds(const struct model *m, struct ray_scene *s)
+{
+	double lo[3] = { INFINITY, INFINITY, INFINITY };
+	double hi[3] = { -INFINITY, -INFINITY, -INFINITY };
+
+	for (size_t i = 0; i < 3 * m->triangles; i++)
+		for (int k = 0; k < 3; k++) {
+			double x = m->vertex[3 * (size_t)m->triangle[i] + (size_t)k];
+			lo[k] = fmin(lo[k], x);
+			hi[k] = fmax(hi[k], x);
+		}
+	s->unit = 0;
+	for (int k = 0; k < 3; k++) {
+		s->centre[k] = m->triangles ? lo[k] + (hi[k] - lo[k]) / 2 : 0;
+		s->unit = fmax(s->unit, (hi[k] - lo[k]) / 2);
+	}
+	if (!(s->unit > 0))
+		s->unit = 1;
+}
+
+static void to_unit(const struct ray_scene *s, const double x[3], float out[3])
+{
+	for (int k = 0; k < 3; k++)
+		out[k] = (float)((x[k] - s->centre[k]) / s->unit);
+}
+
+static int fill_geometry(struct ray_scene *s, const struct model *m, RTCGeometry g,
+                         struct err *e)
+{
+	float *v = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+	                                   3 * sizeof *v, m->vertices);
+	uint32_t *t = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+	                                      3 * sizeof *t, m->triangles);
+	if (!v || !t)
+		return err_set(e, "Embree: no memory for %zu triangles", m->triangles);
+	for (size_t i = 0; i < m->vertices; i++)
+		to_unit(s, &m->vertex[3 * i], &v[3 * i]);
+	memcpy(t, m->triangle, 3 * m->triangles * sizeof *t);
+	for (size_t i = 0; i < m->triangles; i++) {
+		const uint32_t *c = &m->triangle[3 * i];
+		double n[3];
+		v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
+		        &m->vertex[3 * (size_t)c[2]], n);
+		v3_normalise(n);
+		for (int k = 0; k < 3; k++)
+			s->normal[i][k] = (float)n[k];
+	}
+	return 0;
+}
+
+struct ray_scene *ray_scene_new(const struct model *m, struct err *e)
+{
+	struct ray_scene *s = mem_new(1, sizeof *s, "ray scene", e);
+	RTCGeometry g = NULL;
+	int bad = -1;
+
+	if (!s)
+		return NULL;
+	bounds(m, s);
+	s->normal = mem_new(m->triangles, sizeof *s->normal, "triangle normals", e);
+	s->device = rtcNewDevice(NULL);
+	if (s->normal && s->device) {
+		s->scene = rtcNewScene(s->device);
+		rtcSetSceneFlags(s->scene, RTC_SCENE_FLAG_ROBUST);
+		g = rtcNewGeometry(s->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+		bad = fill_geometry(s, m, g, e);
+	}
+	if (!bad) {
+		rtcCommitGeometry(g);
+		rtcAttachGeometry(s->scene, g);
+		rtcCommitScene(s->scene);
+		if (rtcGetDeviceError(s->device) != RTC_ERROR_NONE)
+			bad = err_set(e, "Embree: could not build the ray scene");
+	}
+	if (g)
+		rtcReleaseGeometry(g);
+	if (!bad)
+		return s;
+	err_set(e, "Embree: no device");
+	ray_scene_free(s);
+	return NULL;
+}
+
+void ray_scene_free(struct ray_scene *s)
+{
+	if (!s)
+		return;
+	if (s->scene)
+		rtcReleaseScene(s->scene);
+	if (s->device)
+		rtcReleaseDevice(s->device);
+	free(s->normal);
+	free(s);
+}
+
+double ray_offset(const struct ray_scene *s)
+{
+	return offset_units * s->unit;
+}
+
+void ray_leave(const struct ray_scene *s, const double n[3], double x[3])
+{
+	v3_mad(x, offset_units * s->unit, n, x);
+}
+
+void ray_nearest(const struct ray_scene *s, const double org[3], const double dir[3],
+                 struct ray_hit *hit)
+{
+	struct RTCRayHit r;
+
+	to_unit(s, org, &r.ray.org_x);
+	r.ray.dir_x = (float)dir[0];
+	r.ray.dir_y = (float)dir[1];
+	r.ray.dir_z = (float)dir[2];
+	r.ray.tnear = 0;
+	r.ray.tfar = INFINITY;
+	r.ray.time = 0;
+	r.ray.mask = 0xffffffffu;
+	r.ray.id = 0;
+	r.ray.flags = 0;
+	r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+	r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+#if EMBREE >= 4
+	rtcIntersect1(s->scene, &r, NULL);
+#else
+	struct RTCIntersectContext context;
+	rtcInitIntersectContext(&context);
+	rtcIntersect1(s->scene, &context, &r);
+#endif
+	hit->triangle = RAY_MISS;
+	if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID)
+		return;
+	const float *n = s->normal[r.hit.primID];
+	hit->triangle = r.hit.primID;
+	hit->side = (double)n[0] * dir[0] + (double)n[1] * dir[1] + (double)n[2] * dir[2] > 0;
+	hit->t = (double)r.ray.tfar * s->unit;
+	hit->w[1] = (double)r.hit.u;
+	hit->w[2] = (double)r.hit.v;
+	hit->w[0] = 1 - hit->w[1] - hit->w[2];
+}
+
+int ray_blocked(const struct ray_scene *s, const double a[3], const double b[3])
+{
+	struct RTCRay r;
+	float end[3];
+
+	to_unit(s, a, &r.org_x);
+	to_unit(s, b, end);
+	r.dir_x = end[0] - r.org_x;
+	r.dir_y = end[1] - r.org_y;
+	r.dir_z = end[2] - r.org_z;
+	r.tnear = 0;
+	r.tfar = 1;
+	r.time = 0;
+	r.mask = 0xffffffffu;
+	r.id = 0;
+	r.flags = 0;
+#if EMBREE >= 4
+	rtcOccluded1(s->scene, &r, NULL);
+#else
+	struct RTCIntersectContext context;
+	rtcInitIntersectContext(&context);
+	rtcOccluded1(s->scene, &context, &r);
+#endif
+	return r.tfar < 0;
+}
