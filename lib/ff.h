@@ -27,7 +27,8 @@
 #include "err.h"
 #include "model.h"
 
-enum { FF_ANY = 0xffffffffu, FF_NO_ROW = 0xffffffffu };
+#define FF_ANY UINT32_MAX    /* link_source: no particular one */
+#define FF_NO_ROW UINT32_MAX /* link_row: no such lobe */
 
 enum ff_row_kind {
 	FF_DIFFUSE = 0,     /* Lambertian, one for each patch-side that can shoot */

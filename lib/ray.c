@@ -140,8 +140,12 @@ void ray_nearest(const struct ray_scene *s, const double org[3], const double di
                  struct ray_hit *hit)
 {
 	struct RTCRayHit r;
+	float o[3];
 
-	to_unit(s, org, &r.ray.org_x);
+	to_unit(s, org, o);
+	r.ray.org_x = o[0];
+	r.ray.org_y = o[1];
+	r.ray.org_z = o[2];
 	r.ray.dir_x = (float)dir[0];
 	r.ray.dir_y = (float)dir[1];
 	r.ray.dir_z = (float)dir[2];
@@ -175,13 +179,16 @@ void ray_nearest(const struct ray_scene *s, const double org[3], const double di
 int ray_blocked(const struct ray_scene *s, const double a[3], const double b[3])
 {
 	struct RTCRay r;
-	float end[3];
+	float o[3], end[3];
 
-	to_unit(s, a, &r.org_x);
+	to_unit(s, a, o);
 	to_unit(s, b, end);
-	r.dir_x = end[0] - r.org_x;
-	r.dir_y = end[1] - r.org_y;
-	r.dir_z = end[2] - r.org_z;
+	r.org_x = o[0];
+	r.org_y = o[1];
+	r.org_z = o[2];
+	r.dir_x = end[0] - o[0];
+	r.dir_y = end[1] - o[1];
+	r.dir_z = end[2] - o[2];
 	r.tnear = 0;
 	r.tfar = 1;
 	r.time = 0;

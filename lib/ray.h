@@ -10,7 +10,7 @@
 
 struct ray_scene;
 
-enum { RAY_MISS = 0xffffffffu };
+#define RAY_MISS UINT32_MAX
 
 struct ray_hit {
 	uint32_t triangle;  /* input triangle, or RAY_MISS */
