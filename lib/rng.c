@@ -32,33 +32,22 @@ static void fill_directions(void)
 	}
 }
 
-static uint32_t reverse_bits(uint32_t x)
+uint32_t rng_sobol_bits(uint32_t index, int dim)
 {
-	x = __builtin_bswap32(x);
-	x = ((x & 0x0f0f0f0fu) << 4) | ((x >> 4) & 0x0f0f0f0fu);
-	x = ((x & 0x33333333u) << 2) | ((x >> 2) & 0x33333333u);
-	return ((x & 0x55555555u) << 1) | ((x >> 1) & 0x55555555u);
+	uint32_t x = 0;
+
+	for (const uint32_t *v = direction[dim]; index; v++, index >>= 1)
+		if (index & 1)
+			x ^= *v;
+	return rng_reverse_bits(x);
 }
 
-/* Each output bit depends only on the lower input bits: a nested scramble of
- * the bit-reversed number. */
-static uint32_t owen_reversed(uint32_t x, uint32_t seed)
+uint32_t rng_sobol_seed(uint64_t seed, int dim)
 {
-	x ^= x * 0x3d20adeau;
-	x += seed;
-	x *= (seed >> 16) | 1;
-	x ^= x * 0x05526c56u;
-	x ^= x * 0x53a22864u;
-	return x;
+	return (uint32_t)rng_mix(seed + (uint64_t)dim * 0x632be59bd9b4e019u);
 }
 
 double rng_sobol(uint32_t index, int dim, uint64_t seed)
 {
-	uint32_t x = 0, i = index;
-
-	for (const uint32_t *v = direction[dim]; i; v++, i >>= 1)
-		if (i & 1)
-			x ^= *v;
-	x = owen_reversed(reverse_bits(x), (uint32_t)rng_mix(seed + (uint64_t)dim * 0x632be59bd9b4e019u));
-	return (double)reverse_bits(x) * 0x1p-32;
+	return rng_scramble(rng_sobol_bits(index, dim), rng_sobol_seed(seed, dim));
 }

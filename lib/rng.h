@@ -44,4 +44,31 @@ static inline double rng_uniform(struct rng *r)
  * Burley's constants (JCGT 9(4), 2020). */
 double rng_sobol(uint32_t index, int dim, uint64_t seed);
 
+/* The two halves of rng_sobol, for loops over many points of many scrambles:
+ * the bits of an unscrambled coordinate, and the scramble of such bits by a
+ * seed of rng_sobol_seed. */
+uint32_t rng_sobol_bits(uint32_t index, int dim);
+uint32_t rng_sobol_seed(uint64_t seed, int dim);
+
+static inline uint32_t rng_reverse_bits(uint32_t x)
+{
+	x = __builtin_bswap32(x);
+	x = ((x & 0x0f0f0f0fu) << 4) | ((x >> 4) & 0x0f0f0f0fu);
+	x = ((x & 0x33333333u) << 2) | ((x >> 2) & 0x33333333u);
+	return ((x & 0x55555555u) << 1) | ((x >> 1) & 0x55555555u);
+}
+
+static inline double rng_scramble(uint32_t bits, uint32_t seed)
+{
+	uint32_t x = bits;
+	/* Each output bit depends only on the lower input bits: a nested
+	 * scramble of the bit-reversed number. */
+	x ^= x * 0x3d20adeau;
+	x += seed;
+	x *= (seed >> 16) | 1;
+	x ^= x * 0x05526c56u;
+	x ^= x * 0x53a22864u;
+	return (double)rng_reverse_bits(x) * 0x1p-32;
+}
+
 #endif

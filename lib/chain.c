@@ -1,0 +1,142 @@
+#include "chain.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "bsdf.h"
+#include "rng.h"
+
+static int rehash(struct chains *c, size_t size, struct err *e);
+
+int chains_init(struct chains *c, const struct model *m, struct err *e)
+{
+	size_t ids = 4 * m->material.n;
+
+	*c = (struct chains){ 0 };
+	c->event = mem_new(ids, sizeof *c->event, "ideal events", e);
+	c->slot = mem_new(ids, sizeof *c->slot, "ideal events", e);
+	if (!c->event || !c->slot)
+		return -1;
+	for (size_t id = 0; id < ids; id++) {
+		int ideal = bsdf_has_ideal(&m->material, id / 4, (int)(id / 2 % 2), (int)(id % 2));
+		c->slot[id] = ideal ? c->events : CHAIN_NONE;
+		if (ideal)
+			c->event[c->events++] = (uint32_t)id;
+	}
+	uint32_t *none = mem_new(c->events, sizeof *none, "chains", e);
+	int bad = !none || rehash(c, 64, e) || chains_find(c, none, e) == CHAIN_NONE;
+	free(none);
+	return bad ? -1 : 0;
+}
+
+void chains_free(struct chains *c)
+{
+	free(c->event);
+	free(c->slot);
+	free(c->count.data);
+	free(c->child.data);
+	free(c->length.data);
+	free(c->hash);
+	*c = (struct chains){ 0 };
+}
+
+static uint64_t hash_counts(const uint32_t *count, uint32_t n)
+{
+	uint64_t h = n;
+
+	for (uint32_t i = 0; i < n; i++)
+		h = rng_mix(h ^ count[i]);
+	return h;
+}
+
+/* The place of a chain in the hash table, or the free place where it belongs. */
+static size_t place(const struct chains *c, const uint32_t *count)
+{
+	size_t at = hash_counts(count, c->events) & (c->hash_size - 1);
+
+	while (c->hash[at] != CHAIN_NONE &&
+	       memcmp(chains_count(c, c->hash[at]), count, c->events * sizeof *count))
+		at = (at + 1) & (c->hash_size - 1);
+	return at;
+}
+
+static int rehash(struct chains *c, size_t size, struct err *e)
+{
+	uint32_t *hash = mem_new(size, sizeof *hash, "chains", e);
+
+	if (!hash)
+		return -1;
+	memset(hash, 0xff, size * sizeof *hash);
+	free(c->hash);
+	c->hash = hash;
+	c->hash_size = size;
+	for (uint32_t i = 0; i < c->n; i++)
+		c->hash[place(c, chains_count(c, i))] = i;
+	return 0;
+}
+
+uint32_t chains_find(struct chains *c, const uint32_t *count, struct err *e)
+{
+	size_t at = place(c, count);
+	uint32_t length = 0;
+
+	if (c->hash[at] != CHAIN_NONE)
+		return c->hash[at];
+	if (c->n >= CHAIN_NONE - 1) {
+		err_set(e, "more than 4e9 chains of mirrors; lower --depth");
+		return CHAIN_NONE;
+	}
+	for (uint32_t i = 0; i < c->events; i++)
+		length += count[i];
+	if (vec_append(&c->count, count, c->events, sizeof *count, e) ||
+	    vec_append(&c->length, &length, 1, sizeof length, e) ||
+	    vec_reserve(&c->child, c->events, sizeof(uint32_t), e))
+		return CHAIN_NONE;
+	memset((uint32_t *)c->child.data + c->child.n, 0xff, c->events * sizeof(uint32_t));
+	c->child.n += c->events;
+	c->hash[at] = (uint32_t)c->n++;
+	if (2 * c->n > c->hash_size && rehash(c, 2 * c->hash_size, e))
+		return CHAIN_NONE;
+	return (uint32_t)(c->n - 1);
+}
+
+uint32_t chains_child(struct chains *c, uint32_t chain, uint32_t event, struct err *e)
+{
+	size_t at = (size_t)chain * c->events + event;
+	uint32_t child = ((uint32_t *)c->child.data)[at];
+
+	if (child != CHAIN_NONE)
+		return child;
+	uint32_t *count = mem_new(c->events, sizeof *count, "chains", e);
+	if (!count)
+		return CHAIN_NONE;
+	memcpy(count, chains_count(c, chain), c->events * sizeof *count);
+	count[event]++;
+	child = chains_find(c, count, e);
+	free(count);
+	((uint32_t *)c->child.data)[at] = child;
+	return child;
+}
+
+uint32_t chains_reverse(struct chains *c, uint32_t chain, struct err *e)
+{
+	uint32_t *count, found = CHAIN_NONE;
+	int passes = 1;
+
+	if (chains_length(c, chain) == 0)
+		return chain;
+	if (!(count = mem_new(c->events, sizeof *count, "chains", e)))
+		return CHAIN_NONE;
+	for (uint32_t i = 0; i < c->events; i++) {
+		uint32_t n = chains_count(c, chain)[i], id = c->event[i];
+		uint32_t to = c->slot[id & 1 ? id ^ 2 : id];
+		if (n && to == CHAIN_NONE)
+			passes = 0;
+		else if (n)
+			count[to] = n;
+	}
+	if (passes)
+		found = chains_find(c, count, e);
+	free(count);
+	return found;
+}

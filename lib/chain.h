@@ -1,0 +1,57 @@
+/* Chains of ideal specular events, as multisets.
+ *
+ * Colours multiply, so the order of the events does not matter to the light
+ * that comes through: a chain is how often each ideal event was passed. The
+ * ideal events of a model are few (one for each material, side and direction
+ * with an infinite exponent), the chains can be many. */
+#ifndef TWOPASS_CHAIN_H
+#define TWOPASS_CHAIN_H
+
+#include <stdint.h>
+
+#include "err.h"
+#include "mem.h"
+#include "model.h"
+
+#define CHAIN_NONE UINT32_MAX
+
+struct chains {
+	uint32_t events;        /* ideal events of the model */
+	uint32_t *event;        /* ids, ascending: ff.h */
+	uint32_t *slot;         /* [4 materials] event id -> index, or CHAIN_NONE */
+	struct vec count;       /* uint32_t [n][events] */
+	struct vec child;       /* uint32_t [n][events], CHAIN_NONE = not made yet */
+	struct vec length;      /* uint32_t [n] total count */
+	size_t n;
+	uint32_t *hash;         /* open addressing, CHAIN_NONE = free */
+	size_t hash_size;
+};
+
+/* Finds the model's ideal events and makes the empty chain, number 0.
+ * 0, or -1 and e. */
+int chains_init(struct chains *c, const struct model *m, struct err *e);
+void chains_free(struct chains *c);
+
+/* The chain with these counts [events], made if new; CHAIN_NONE and e when out
+ * of memory. O(events). */
+uint32_t chains_find(struct chains *c, const uint32_t *count, struct err *e);
+
+/* The chain after one more event (by index). */
+uint32_t chains_child(struct chains *c, uint32_t chain, uint32_t event, struct err *e);
+
+/* The chain as light sees it that travels the other way: straight-through events
+ * are met from the other side. CHAIN_NONE where such light cannot pass (without
+ * an error) or when out of memory. */
+uint32_t chains_reverse(struct chains *c, uint32_t chain, struct err *e);
+
+static inline uint32_t chains_length(const struct chains *c, uint32_t chain)
+{
+	return ((const uint32_t *)c->length.data)[chain];
+}
+
+static inline const uint32_t *chains_count(const struct chains *c, uint32_t chain)
+{
+	return (const uint32_t *)c->count.data + (size_t)chain * c->events;
+}
+
+#endif
