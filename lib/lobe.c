@@ -31,43 +31,14 @@ static double gamma_ratio(double a)
 	return sqrt(a) / s;
 }
 
-/* The continued fraction of the incomplete beta function (DLMF 8.17.22) for
- * b = 1/2, by the modified Lentz method; x^a (1-x)^b / (a B) times it is I_x. */
-static double beta_fraction(double a, double x)
-{
-	enum { MAX_TERMS = 10000 };
-	const double b = .5, tiny = 1e-300;
-	double c = 1, d = 1 - (a + b) * x / (a + 1), h;
-
-	d = 1 / (fabs(d) < tiny ? tiny : d);
-	h = d;
-	for (int m = 1; m < MAX_TERMS; m++) {
-		double a2m = a + 2 * m, before = h;
-		double even = m * (b - m) * x / ((a2m - 1) * a2m);
-		double odd = -(a + m) * (a + b + m) * x / (a2m * (a2m + 1));
-		d = 1 + even * d;
-		c = 1 + even / c;
-		d = 1 / (fabs(d) < tiny ? tiny : d);
-		c = fabs(c) < tiny ? tiny : c;
-		h *= d * c;
-		d = 1 + odd * d;
-		c = 1 + odd / c;
-		d = 1 / (fabs(d) < tiny ? tiny : d);
-		c = fabs(c) < tiny ? tiny : c;
-		h *= d * c;
-		if (fabs(h - before) <= 1e-15 * fabs(h))
-			break;
-	}
-	return h;
-}
-
-/* sum over j of (a + 1/2)_j / (3/2)_j y^j (DLMF 8.17.8 for I_y(1/2, a)). */
-static double beta_series(double a, double y)
+/* sum over j of (p + 1/2)_j / (q + 1)_j z^j: what DLMF 8.17.8 leaves of the
+ * incomplete beta function. Positive terms, so nothing cancels. */
+static double beta_series(double p, double q, double z)
 {
 	double term = 1, sum = 1;
 
 	for (int j = 0; term > 1e-16 * sum; j++) {
-		term *= (a + .5 + j) / (1.5 + j) * y;
+		term *= z * (p + .5 + j) / (q + 1 + j);
 		sum += term;
 	}
 	return sum;
@@ -86,15 +57,15 @@ double lobe_normaliser(double k, double cos_theta)
 		return whole;
 	if (k == 0)
 		return 2 * (pi - acos(cos_theta));
-	/* I <= x^a / cos theta, because the fraction is below 1 / (1 - x). */
+	/* I(x; a, 1/2) <= x^a / cos theta, because the series' terms are below x^j. */
 	double exponent = a * log1p(-y);
 	if (exponent < -34 + log(cos_theta))
 		return whole;
+	/* x^a (1-x)^(1/2) / (a B(a, 1/2)); the series of I about the nearer end. */
 	double power = exp(exponent) * cos_theta / (sqrt(pi) * gamma_ratio(a));
-	if (a * y > 2)
-		return whole * (1 - .5 * power * beta_fraction(a, x));
-	/* I = 1 - I_y(1/2, a); B(1/2, a) / 2 = a B / (2 a) */
-	return whole * .5 * (1 + 2 * a * power * beta_series(a, y));
+	if (x < .5)
+		return whole * (1 - .5 * power * beta_series(a, a, x));
+	return whole * .5 * (1 + 2 * a * power * beta_series(a, .5, y));
 }
 
 /* Mean over psi of clamp((A + B cos psi) / c, 0, 1), B >= 0. */
