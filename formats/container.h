@@ -43,9 +43,9 @@ int container_meta(struct container_writer *w, const char *key, const char *valu
                    struct err *e);
 
 /* Checks that every array got what its shape says, adds the digests, writes
- * everything to a temporary file beside the target, fsyncs and renames (a
- * target that is not a regular file is written directly). Frees w in any case.
- * 0, or -1 and e, with the old file whole. */
+ * everything through an atomic_file. Frees w in any case. 0, or -1 and e, with
+ * the old file whole. Cost: one copy of the arrays (they are kept in memory
+ * while small, else in unlinked files beside the target). */
 int container_finish(struct container_writer *w, struct err *e);
 
 /* Gives up: removes temporary files and frees w (NULL allowed). */
@@ -95,8 +95,15 @@ int container_verify(const struct container *c, const struct container_view *v,
 /* Verifies every array. */
 int container_verify_all(const struct container *c, struct err *e);
 
-/* XXH3-128 of all array digests and the metadata but for keys beginning with
- * "camera": 32 hex digits and NUL. What a file that builds on this one binds to. */
+/* XXH3-128 of all array digests and the metadata: 32 hex digits and NUL. What a
+ * file that builds on this one binds to. Left out is what changes without
+ * touching a solution: arrays and keys beginning with "camera", the key, the
+ * report and the header's own digest. */
 void container_digest(const struct container *c, char hex[33]);
+
+/* "PATH: <text>; run TOOL again", TOOL being what makes this kind of file: the
+ * refusal of contents that container_open cannot judge. Returns -1. */
+int container_refuse(const struct container *c, struct err *e, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
 
 #endif
