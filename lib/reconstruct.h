@@ -1,0 +1,52 @@
+/* Irradiance at the corners of elements, for smooth interpolation over surfaces.
+ *
+ * The elements about a vertex that belong to one surface and are joined by edges
+ * flatter than the crease angle form a smooth group. Its value at the vertex is
+ * that of a linear function fitted by area-weighted least squares to the means of
+ * the elements around, so constants and linear fields come out exactly, at the
+ * borders of a surface too. Where the elements about the vertex do not fix such a
+ * function (borders, corners), rings of neighbours inside the group are added;
+ * where nothing does, the area-weighted mean stands in. The value may leave the
+ * range of the elements about the vertex only as far as the fit is good, and never
+ * drops below 0; where all of them are 0 it is 0.
+ *
+ * Where a wider fit agrees with the elements within their standard errors, it
+ * replaces the narrow one: noise is smoothed, detail is not. */
+#ifndef TWOPASS_RECONSTRUCT_H
+#define TWOPASS_RECONSTRUCT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "err.h"
+#include "model.h"
+#include "solution.h"
+
+struct reconstruction {
+	size_t elements;
+	int bands;
+	float *corner;  /* [elements][3][2 sides][bands] */
+};
+
+/* s->error may be NULL (exact values). Light groups are summed. O(elements), the
+ * same result for any number of threads. 0, or -1 and e. */
+int reconstruct(const struct model *m, const struct solution *s, int threads,
+                struct reconstruction *r, struct err *e);
+void reconstruction_free(struct reconstruction *r);
+
+/* H of both sides at the point of `element` with corner weights w, into
+ * h[2 sides][bands]. */
+static inline void reconstruction_at(const struct reconstruction *r, size_t element,
+                                     const double w[3], double *h)
+{
+	size_t n = 2 * (size_t)r->bands;
+	const float *c = r->corner + 3 * n * element;
+
+	for (size_t i = 0; i < n; i++) {
+		double v = w[0] * (double)c[i] + w[1] * (double)c[n + i] +
+		           w[2] * (double)c[2 * n + i];
+		h[i] = v > 0 ? v : 0; /* weights may be negative by rounding */
+	}
+}
+
+#endif
