@@ -3,15 +3,19 @@
 #define TWOPASS_FF_FILE_H
 
 #include "../lib/ff.h"
+#include "../lib/ff_check.h"
 #include "cache.h"
 
 struct ff_writer;
 
-/* f64: values are float64. */
-struct ff_writer *ff_file_create(const char *path, int f64, struct err *e);
+/* Form factors of the model m, of which the file keeps what makes it readable by
+ * itself: the patches' elements, areas and names. f64: values are float64. */
+struct ff_writer *ff_file_create(const char *path, const struct model *m, int f64,
+                                 struct err *e);
 
 /* Appends a batch: its rows, blocks, entries, arrivals and links (all indices in
- * it relative to the batch; chains ignored) behind those written so far. */
+ * it relative to the batch; chains ignored, block_chain and link_chain are those
+ * of the final table) behind those written so far. O(batch). */
 int ff_file_append(struct ff_writer *w, const struct ff *batch, struct err *e);
 
 /* Writes the chain table and patch range of `whole` (its rows are ignored) and
@@ -20,18 +24,25 @@ int ff_file_finish(struct ff_writer *w, const struct ff *whole, const struct cac
                    struct err *e);
 void ff_file_abandon(struct ff_writer *w);
 
-/* An open .ff; f's arrays point into the mapped file (do not ff_free it). */
+/* An open .ff; f's and scene's arrays point into the mapped file (do not ff_free
+ * f, do not write to them). */
 struct ff_file {
 	struct container *container;
 	struct ff f;
 	struct cache_info info;
 	uint32_t patches;          /* of the model it was made for */
+	/* That model, as far as the file knows it. */
+	struct ff_scene scene;
+	size_t surfaces;
+	char **surface_name;       /* [surfaces] */
+	const uint32_t *patch_surface;
 };
 
 /* Opens and checks all (digests, monotone starts, ranges against `m`, finite and
  * non-negative values, row closure to 1e-9, link order). m may be NULL (inspect):
  * ranges are then checked against the file's own counts. If m_info is given and
- * geometry_id differs: "room.ff: made for another geometry; run ffcalc again". */
+ * geometry_id differs: "room.ff: made for another geometry; run ffcalc again".
+ * O(file); touches every byte twice. */
 int ff_file_open(const char *path, const struct model *m, const struct cache_info *m_info,
                  struct ff_file *out, struct err *e);
 void ff_file_close(struct ff_file *f);
