@@ -210,7 +210,9 @@ static int read_attributes(struct input *in, struct exr_file_info *info)
 		if (check(in, exr_get_attribute_by_index(in->context, 0, EXR_ATTR_LIST_FILE_ORDER,
 		                                         i, &a)))
 			return -1;
+		/* "name" and "type" belong to the format. */
 		if (a->type == EXR_ATTR_STRING && a->string->str &&
+		    strcmp(a->name, "name") != 0 && strcmp(a->name, "type") != 0 &&
 		    exr_file_info_set(info, a->name, a->string->str, in->e))
 			return -1;
 		if (a->type == EXR_ATTR_FLOAT && strcmp(a->name, "whiteLuminance") == 0)
