@@ -1,0 +1,331 @@
+#include "ff_build.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bsdf.h"
+#include "ff_job.h"
+#include "vec3.h"
+
+enum { PATCHES_AT_A_TIME = 128, SOBOL_POINTS_MAX = 1 << 16 };
+
+/* ---- what leaves which side ---- */
+
+static int any(const double *x, int n)
+{
+	for (int i = 0; i < n; i++)
+		if (x[i] > 0)
+			return 1;
+	return 0;
+}
+
+static void side_flags(struct ff_job *j, uint32_t ps)
+{
+	const struct materials *mt = &j->m->material;
+	uint32_t material = model_patch_material(j->m, ps >> 1);
+	int side = (int)(ps & 1), bands = mt->bands;
+	size_t here = material_at(mt, material, side), there = material_at(mt, material, !side);
+	int emits = any(&mt->emission[here], bands);
+	int plain = mt->emission_exponent[2 * material + (uint32_t)side] == 1;
+
+	if (!model_side_modelled(j->m, ps))
+		return;
+	j->shoots_diffuse[ps] = (emits && plain) || any(&mt->rho_d[here], bands) ||
+	                        any(&mt->tau_d[there], bands);
+	j->shoots_lobe[ps] = emits && !plain;
+	j->has_lobe[ps] = bsdf_has_lobe(mt, material, side, 0) ||
+	                  bsdf_has_lobe(mt, material, side, 1);
+	j->is_ideal[ps] = bsdf_has_ideal(mt, material, side, 0) ||
+	                  bsdf_has_ideal(mt, material, side, 1);
+	j->is_source[ps] = j->shoots_diffuse[ps] || j->shoots_lobe[ps] ||
+	                   bsdf_has_lobe(mt, material, side, 0) ||
+	                   bsdf_has_lobe(mt, material, !side, 1);
+}
+
+/* ---- points on patches ---- */
+
+uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, double x[3])
+{
+	const struct model *m = j->m;
+	uint32_t lo = m->patch_start[patch], hi = m->patch_start[patch + 1] - 1;
+	uint32_t first = lo;
+	double area = u0 * j->element_cdf[hi];
+
+	while (lo < hi) {
+		uint32_t mid = lo + (hi - lo) / 2;
+		if (j->element_cdf[mid] <= area)
+			lo = mid + 1;
+		else
+			hi = mid;
+	}
+	double before = lo > first ? j->element_cdf[lo - 1] : 0;
+	double r = sqrt(fmin(1, fmax(0, (area - before) / (j->element_cdf[lo] - before))));
+	double w[3] = { 1 - r, r * (1 - u1), r * u1 }, inset = j->element_inset[lo];
+	x[0] = x[1] = x[2] = 0;
+	for (int c = 0; c < 3; c++)
+		v3_mad(x, w[c] + inset * (1. / 3 - w[c]),
+		       &m->vertex[3 * (size_t)m->element[3 * (size_t)lo + (size_t)c]], x);
+	return lo;
+}
+
+void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3])
+{
+	double s = side ? -1 : 1;
+
+	for (int k = 0; k < 3; k++)
+		n[k] = s * j->m->element_normal[3 * (size_t)element + (size_t)k];
+}
+
+static void element_tables(struct ff_job *j)
+{
+	const struct model *m = j->m;
+
+	for (size_t p = 0; p < m->patches; p++) {
+		double sum = 0;
+		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++) {
+			double size = sqrt(m->element_area[i]);
+			j->element_cdf[i] = sum += m->element_area[i];
+			/* Clear of walls along the edges by a few float32 steps of the
+			 * scene, but never far from where the sample belongs. */
+			j->element_inset[i] = fmin(.2, 4 * ray_offset(j->rays) / size);
+		}
+	}
+}
+
+/* ---- a job ---- */
+
+static int job_arrays(struct ff_job *j, struct err *e)
+{
+	size_t sides = 2 * j->m->patches, elements = j->m->elements;
+	uint64_t n = (uint64_t)j->o.rays * j->o.emitter_gain / FF_REPLICATES;
+
+	j->sobol_points = n < SOBOL_POINTS_MAX ? (uint32_t)n : SOBOL_POINTS_MAX;
+	j->element_cdf = mem_new(elements, sizeof *j->element_cdf, "sampling tables", e);
+	j->element_inset = mem_new(elements, sizeof *j->element_inset, "sampling tables", e);
+	j->shoots_diffuse = mem_new(sides, 1, "patch flags", e);
+	j->shoots_lobe = mem_new(sides, 1, "patch flags", e);
+	j->has_lobe = mem_new(sides, 1, "patch flags", e);
+	j->is_source = mem_new(sides, 1, "patch flags", e);
+	j->is_ideal = mem_new(sides, 1, "patch flags", e);
+	j->sobol = mem_new((size_t)j->sobol_points * FF_DIMS, sizeof *j->sobol, "sample points", e);
+	return j->element_cdf && j->element_inset && j->shoots_diffuse && j->shoots_lobe &&
+	       j->has_lobe && j->is_source && j->is_ideal && j->sobol ? 0 : -1;
+}
+
+static int job_init(struct ff_job *j, const struct model *m, const struct ff_options *o,
+                    struct err *e)
+{
+	*j = (struct ff_job){ .m = m, .o = *o };
+	if (job_arrays(j, e) || !(j->rays = ray_scene_new(m, e)))
+		return -1;
+	if (o->method == FF_HEMICUBE && (hemi_grid_init(&j->grid, (int)o->rays, e) ||
+	                                 !(j->cubes = hemi_scene_new(m, e))))
+		return -1;
+	for (uint32_t i = 0; i < j->sobol_points; i++)
+		for (int d = 0; d < FF_DIMS; d++)
+			j->sobol[(size_t)i * FF_DIMS + (size_t)d] = rng_sobol_bits(i, d);
+	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
+		side_flags(j, ps);
+	element_tables(j);
+	return 0;
+}
+
+static void job_free(struct ff_job *j)
+{
+	void *array[] = { j->element_cdf, j->element_inset, j->shoots_diffuse, j->shoots_lobe,
+		j->has_lobe, j->is_source, j->is_ideal, j->sobol };
+
+	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
+		free(array[i]);
+	ray_scene_free(j->rays);
+	hemi_scene_free(j->cubes);
+	hemi_grid_free(&j->grid);
+}
+
+static int thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e)
+{
+	*t = (struct ff_thread){ .job = j };
+	if (tally_init(&t->tally, j->m, j->has_lobe, e))
+		return -1;
+	if (j->o.method != FF_HEMICUBE)
+		return 0;
+	t->item = mem_new(2 * (size_t)j->o.points, j->grid.pixels * sizeof *t->item,
+	                  "hemicube items", e);
+	t->view = mem_new(2 * (size_t)j->o.points, sizeof *t->view, "hemicube views", e);
+	return t->item && t->view ? hemicube_init(&t->cube, &j->grid, e) : -1;
+}
+
+static void thread_free(struct ff_thread *t)
+{
+	tally_free(&t->tally);
+	hemicube_free(&t->cube);
+	free(t->captures.data);
+	free(t->item);
+	free(t->view);
+	free(t->chain_map.data);
+}
+
+/* ---- the loop over patches ---- */
+
+struct run {
+	const struct ff_job *job;
+	struct ff_thread *thread;
+	struct ff_batch *batch;   /* [PATCHES_AT_A_TIME] */
+	int *owner;               /* thread that made each batch */
+	struct err *err;          /* [PATCHES_AT_A_TIME] */
+	uint32_t first;
+};
+
+static void do_patches(void *arg, size_t begin, size_t end, int thread)
+{
+	struct run *r = arg;
+
+	for (size_t i = begin; i < end; i++) {
+		uint32_t patch = r->first + (uint32_t)i;
+		r->owner[i] = thread;
+		if (r->job->o.method == FF_HEMICUBE)
+			ff_patch_hemicube(&r->thread[thread], patch, &r->batch[i], &r->err[i]);
+		else
+			ff_patch_rays(&r->thread[thread], patch, &r->batch[i], &r->err[i]);
+	}
+}
+
+static void count(struct ff_stats *s, const struct ff *f)
+{
+	for (size_t r = 0; r < f->rows; r++) {
+		double cut = 0;
+		s->rows[f->row_kind[r]]++;
+		s->worst_residual = fmax(s->worst_residual, fabs(f->row_residual[r]));
+		for (uint64_t b = f->row_block[r]; b < f->row_block[r + 1]; b++)
+			cut += f->block_cut[b] * f->row_scale[r];
+		s->cut = fmax(s->cut, cut);
+		if (f->row_kind[r] == FF_DIFFUSE) {
+			s->samples += f->row_samples[r];
+			s->mean_error += f->row_error[r];
+			s->worst_error = fmax(s->worst_error, f->row_error[r]);
+		}
+	}
+	s->links += f->links;
+	s->blocks += f->blocks;
+	s->entries += f->entries;
+}
+
+/* Hands the finished batches on, in patch order, with the file's chain numbers. */
+static int emit(struct run *r, size_t n, struct chains *whole, struct ff_stats *stats,
+                const struct ff_sink *sink, struct err *e)
+{
+	int bad = 0;
+
+	for (size_t i = 0; i < n; i++) {
+		struct ff_thread *t = &r->thread[r->owner[i]];
+		struct ff_batch *b = &r->batch[i];
+		if (!bad && r->err[i].set)
+			bad = err_set(e, "%s", r->err[i].text);
+		if (!bad && b->row_side.n) {
+			bad = batch_renumber(b, &t->tally.chains, &t->chain_map, whole, e);
+			struct ff f = batch_view(b);
+			if (!bad)
+				count(stats, &f);
+			bad = bad || sink->put(sink->arg, &f, e);
+		}
+		batch_free(b);
+	}
+	return bad;
+}
+
+struct part_progress {
+	const struct progress *to;
+	double before, total;
+};
+
+static void report(void *arg, double done, double total)
+{
+	struct part_progress *p = arg;
+
+	(void)total;
+	if (p->to && p->to->fn)
+		p->to->fn(p->to->arg, p->before + done, p->total);
+}
+
+static int all_patches(struct run *r, uint32_t begin, uint32_t end, struct chains *whole,
+                       struct ff_stats *stats, const struct ff_sink *sink,
+                       const struct progress *progress, struct err *e)
+{
+	for (uint32_t p = begin; p < end; p += PATCHES_AT_A_TIME) {
+		size_t n = end - p < PATCHES_AT_A_TIME ? end - p : PATCHES_AT_A_TIME;
+		struct part_progress pp = { progress, p - begin, end - begin };
+		struct progress inner = { report, &pp };
+		r->first = p;
+		par_for(n, 1, r->job->o.threads, do_patches, r, &inner);
+		if (emit(r, n, whole, stats, sink, e))
+			return -1;
+	}
+	return 0;
+}
+
+/* ---- the chain table of the file ---- */
+
+static int put_chains(struct ff *f, const struct chains *c, struct err *e)
+{
+	size_t events = 0;
+
+	for (uint32_t i = 0; i < c->n; i++)
+		for (uint32_t k = 0; k < c->events; k++)
+			events += chains_count(c, i)[k] > 0;
+	f->chains = c->n;
+	f->chain_start = mem_new(c->n + 1, sizeof *f->chain_start, "chains", e);
+	f->chain_event = mem_new(events, sizeof *f->chain_event, "chains", e);
+	f->chain_count = mem_new(events, sizeof *f->chain_count, "chains", e);
+	if (!f->chain_start || !f->chain_event || !f->chain_count)
+		return -1;
+	for (uint32_t i = 0; i < c->n; i++) {
+		for (uint32_t k = 0; k < c->events; k++)
+			if (chains_count(c, i)[k]) {
+				f->chain_event[f->chain_events] = c->event[k];
+				f->chain_count[f->chain_events++] = chains_count(c, i)[k];
+			}
+		f->chain_start[i + 1] = f->chain_events;
+	}
+	return 0;
+}
+
+int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole,
+             struct ff_stats *stats, const struct ff_sink *sink,
+             const struct progress *progress, struct err *e)
+{
+	struct ff_job job;
+	struct chains chains = { 0 };
+	int threads = o->threads > 0 ? o->threads : 1;
+	struct run run = { .job = &job };
+	int bad = job_init(&job, m, o, e) || chains_init(&chains, m, e);
+
+	*stats = (struct ff_stats){ 0 };
+	*whole = (struct ff){ .part = o->part, .parts = o->parts };
+	whole->patch_begin = (uint32_t)((uint64_t)m->patches * (o->part - 1) / o->parts);
+	whole->patch_end = (uint32_t)((uint64_t)m->patches * o->part / o->parts);
+	run.thread = mem_new((size_t)threads, sizeof *run.thread, "threads", e);
+	run.batch = mem_new(PATCHES_AT_A_TIME, sizeof *run.batch, "batches", e);
+	run.owner = mem_new(PATCHES_AT_A_TIME, sizeof *run.owner, "batches", e);
+	run.err = mem_new(PATCHES_AT_A_TIME, sizeof *run.err, "batches", e);
+	bad = bad || !run.thread || !run.batch || !run.owner || !run.err;
+	for (int t = 0; !bad && t < threads; t++)
+		bad = thread_init(&run.thread[t], &job, e);
+	for (size_t i = 0; !bad && i < PATCHES_AT_A_TIME; i++)
+		run.batch[i].f64 = o->f64;
+	bad = bad || all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats,
+	                         sink, progress, e) || put_chains(whole, &chains, e);
+	for (int t = 0; run.thread && t < threads; t++) {
+		stats->rays += run.thread[t].rays;
+		thread_free(&run.thread[t]);
+	}
+	if (stats->rows[FF_DIFFUSE])
+		stats->mean_error /= (double)stats->rows[FF_DIFFUSE];
+	free(run.thread);
+	free(run.batch);
+	free(run.owner);
+	free(run.err);
+	chains_free(&chains);
+	job_free(&job);
+	return bad ? -1 : 0;
+}

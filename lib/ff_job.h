@@ -1,0 +1,84 @@
+/* What the methods of form-factor computation share (private to lib/ff_*.c). */
+#ifndef TWOPASS_FF_JOB_H
+#define TWOPASS_FF_JOB_H
+
+#include "ff_build.h"
+#include "ff_tally.h"
+#include "hemicube.h"
+#include "ray.h"
+#include "rng.h"
+
+enum { FF_REPLICATES = 4, FF_DIMS = 5 };
+
+/* Shared, read-only while rows are computed. */
+struct ff_job {
+	const struct model *m;
+	struct ff_options o;
+	struct ray_scene *rays;
+	struct hemi_scene *cubes; /* hemicube only */
+	struct hemi_grid grid;
+	uint8_t *is_ideal;        /* [2P] sends light on along an ideal direction */
+	double *element_cdf;      /* [E] area of the patch's elements up to and with this */
+	double *element_inset;    /* [E] how far samples keep from the edges, barycentric */
+	uint8_t *shoots_diffuse;  /* [2P] light can leave this side Lambertian */
+	uint8_t *shoots_lobe;     /* [2P] ... by an emission lobe */
+	uint8_t *has_lobe;        /* [2P] light arriving here leaves by a finite lobe */
+	uint8_t *is_source;       /* [2P] any light leaves here */
+	uint32_t *sobol;          /* [sobol_points][FF_DIMS] bits */
+	uint32_t sobol_points;
+};
+
+/* A way that light can come to a directional patch-side: sampled backwards. */
+struct capture {
+	uint32_t source, chain;   /* patch-side it left; chain as the light passes it */
+	uint32_t element;         /* where it arrives */
+	uint32_t view;            /* hemicube: which sample point */
+	double w;
+	double x[3], l[3];        /* the point, the unit direction to the source */
+};
+
+/* A hemicube's place: just off one side of the patch. */
+struct view {
+	double eye[3], frame[3][3];
+	uint32_t element;
+};
+
+struct ff_thread {
+	const struct ff_job *job;
+	struct tally tally;
+	struct rng rng;
+	struct vec captures;      /* struct capture */
+	int capturing;
+	struct capture now;       /* the sample being followed, while capturing */
+	struct hemicube cube;
+	uint32_t *item;           /* hemicube: [points][2 sides][pixels] of the patch */
+	struct view *view;        /* hemicube: [points][2 sides] */
+	double rays;
+	struct vec chain_map;     /* local -> whole */
+};
+
+/* A point on a patch, uniform by area, from two numbers in [0,1): its element and
+ * position (on the surface, not moved off it). */
+uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, double x[3]);
+
+/* Unit normal of a side of an element. */
+void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3]);
+
+/* Follows a ray (origin already off its surface) carrying weight w of the row's
+ * flux to where it lands, and on through ideal surfaces; tallies everything. */
+void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], double w,
+               uint32_t chain);
+
+/* All rows of one patch into the batch. 0, or -1 and e. */
+int ff_patch_rays(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
+int ff_patch_hemicube(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
+
+/* Casts one lobe direction from a capture's point off a side. */
+typedef void ff_cast_fn(struct ff_thread *t, const struct capture *c, int side,
+                        const double dir[3], double w);
+
+/* Turns the captures of a directional patch-side into links with their G rows. */
+int ff_links(struct ff_thread *t, uint32_t patch_side, ff_cast_fn *cast, struct ff_batch *b,
+             struct err *e);
+
+#endif

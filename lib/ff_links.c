@@ -1,0 +1,272 @@
+/* Directional form factors: eq. (3) of the paper for every source that a
+ * directional patch-side sees.
+ *
+ * The paper takes one direction from a source patch to the directional patch and
+ * weighs the hemicube with cos^k about its mirror image. Here the pair of patches
+ * is sampled: each sample has its own point and direction, distributed as the
+ * diffuse light that really comes from that source (the patch-side's own rays,
+ * read backwards), and the lobe about ITS mirrored direction is sampled with
+ * density cos^k over the whole lobe. Thus no direction is quantised, the
+ * normaliser is never a sum that can miss (eq. 3 with its sum over everything the
+ * lobe sees), and any exponent works alike. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "bsdf.h"
+#include "ff_job.h"
+#include "lobe.h"
+#include "vec3.h"
+
+#define PI 3.14159265358979323846
+
+enum {
+	MIN_LOBE_RAYS = 64,   /* for any one link and lobe */
+	PROBES = 4,           /* point pairs tried for sources that no ray met */
+	BIN_RINGS = 3, BIN_SECTORS = 8
+};
+
+struct order {
+	const struct chains *chains;
+	struct capture c;
+	size_t index;
+};
+
+static int by_source(const void *a, const void *b)
+{
+	const struct order *x = a, *y = b;
+	if (x->c.source != y->c.source)
+		return x->c.source < y->c.source ? -1 : 1;
+	int d = chains_compare(x->chains, x->c.chain, y->c.chain);
+	return d ? d : (x->index > y->index) - (x->index < y->index);
+}
+
+static int sort_captures(struct ff_thread *t, struct err *e)
+{
+	struct capture *c = t->captures.data;
+	size_t n = t->captures.n;
+	struct order *o = mem_new(n, sizeof *o, "light paths", e);
+
+	if (!o)
+		return -1;
+	for (size_t i = 0; i < n; i++)
+		o[i] = (struct order){ &t->tally.chains, c[i], i };
+	if (n)
+		qsort(o, n, sizeof *o, by_source);
+	for (size_t i = 0; i < n; i++)
+		c[i] = o[i].c;
+	free(o);
+	return 0;
+}
+
+/* Tries a few straight lines from the patch-side to every source that none of its
+ * rays met by chain 0, and captures those that are clear. O(sources). */
+static int probe_unseen(struct ff_thread *t, uint32_t ps, const uint8_t *met, struct err *e)
+{
+	const struct ff_job *j = t->job;
+
+	for (uint32_t q = 0; q < 2 * j->m->patches; q++) {
+		if (met[q] || !j->is_source[q] || q >> 1 == ps >> 1)
+			continue;
+		uint64_t seed = rng_mix(j->o.seed ^ (((uint64_t)ps << 32) | q));
+		for (uint32_t i = 0; i < PROBES; i++) {
+			struct capture c = { .source = q, .view = i % j->o.points };
+			double y[3], nx[3], ny[3], r2, cx, cy;
+			c.element = ff_point(j, ps >> 1, rng_sobol(i, 0, seed),
+			                     rng_sobol(i, 1, seed), c.x);
+			uint32_t el = ff_point(j, q >> 1, rng_sobol(i, 2, seed),
+			                       rng_sobol(i, 3, seed), y);
+			ff_normal(j, c.element, (int)(ps & 1), nx);
+			ff_normal(j, el, (int)(q & 1), ny);
+			v3_sub(y, c.x, c.l);
+			r2 = v3_dot(c.l, c.l);
+			cx = v3_dot(c.l, nx);
+			cy = -v3_dot(c.l, ny);
+			if (!(cx > 0 && cy > 0))
+				continue;
+			double from[3] = { c.x[0], c.x[1], c.x[2] };
+			ray_leave(j->rays, nx, from);
+			ray_leave(j->rays, ny, y);
+			t->rays++;
+			if (ray_blocked(j->rays, from, y))
+				continue;
+			v3_normalise(c.l);
+			c.w = cx * cy / (r2 * r2);
+			if (vec_append(&t->captures, &c, 1, sizeof c, e))
+				return -1;
+		}
+	}
+	return 0;
+}
+
+/* Captures without a source of their own: the patch-side's hemisphere in bins of
+ * direction (equal cosine-weighted area), for light nobody expected. */
+static uint32_t direction_bin(const double n[3], const double l[3])
+{
+	double t[3], b[3];
+
+	v3_frame(n, t, b);
+	double x = v3_dot(l, t), y = v3_dot(l, b);
+	int ring = (int)((x * x + y * y) * BIN_RINGS);
+	int sector = (int)((atan2(y, x) / (2 * PI) + .5) * BIN_SECTORS);
+	ring = ring < BIN_RINGS ? ring : BIN_RINGS - 1;
+	sector = sector < BIN_SECTORS ? sector : BIN_SECTORS - 1;
+	return (uint32_t)(ring * BIN_SECTORS + sector);
+}
+
+static int bin_captures(struct ff_thread *t, uint32_t ps, struct err *e)
+{
+	const struct ff_job *j = t->job;
+	uint64_t seed = rng_mix(j->o.seed ^ ~(uint64_t)ps);
+
+	for (uint32_t i = 0; i < BIN_RINGS * BIN_SECTORS * 16; i++) {
+		struct capture c = { .source = FF_ANY, .w = 1, .view = i % j->o.points };
+		double n[3], u[2] = { rng_sobol(i, 2, seed), rng_sobol(i, 3, seed) };
+		c.element = ff_point(j, ps >> 1, rng_sobol(i, 0, seed), rng_sobol(i, 1, seed), c.x);
+		ff_normal(j, c.element, (int)(ps & 1), n);
+		lobe_sample_cosine(n, u, c.l);
+		if (vec_append(&t->captures, &c, 1, sizeof c, e))
+			return -1;
+	}
+	return 0;
+}
+
+/* One lobe ray of a capture: about R on the side of incidence, or about T = -L on
+ * the other. */
+static void cast_one(struct ff_thread *t, const struct capture *c, int side, int transmitted,
+                     double exponent, const double u[2], ff_cast_fn *cast)
+{
+	double n[3], axis[3], dir[3], w = 1;
+	int out = transmitted ? !side : side;
+
+	ff_normal(t->job, c->element, out, n);
+	lobe_mirror(c->l, n, axis);
+	if (transmitted)
+		for (int k = 0; k < 3; k++)
+			axis[k] = -c->l[k];
+	if (t->job->m->lobe == LOBE_PAPER) {
+		lobe_sample(exponent, axis, n, u, dir);
+	} else {
+		lobe_sample_whole(exponent, axis, u, dir);
+		double ci = v3_dot(axis, n), co = v3_dot(dir, n);
+		w = co <= 0 ? 0 : co / fmax(ci, co);
+		tally_rest(&t->tally, 0)->lost += 1 - w;
+	}
+	if (w > 0)
+		cast(t, c, out, dir, w);
+}
+
+/* The G row of one link and lobe: `rays` rays, shared out among its captures in
+ * proportion to their weights (systematic resampling). */
+static int lobe_row(struct ff_thread *t, uint32_t ps, const struct capture *c, size_t n,
+                    int transmitted, uint32_t rays, ff_cast_fn *cast, struct ff_batch *b,
+                    struct err *e)
+{
+	const struct materials *mt = &t->job->m->material;
+	uint32_t material = model_patch_material(t->job->m, ps >> 1);
+	int side = (int)(ps & 1), out = transmitted ? !side : side;
+	double exponent = (transmitted ? mt->beta : mt->alpha)[2 * material + (uint32_t)side];
+	uint64_t seed = rng_next(&t->rng);
+	double sum = 0, cumulated;
+	size_t at = 0;
+
+	for (size_t i = 0; i < n; i++)
+		sum += c[i].w;
+	cumulated = c[0].w;
+	for (uint32_t i = 0; i < rays; i++) {
+		double u[2] = { rng_sobol(i, 0, seed), rng_sobol(i, 1, seed) };
+		double want = (i + .5) / rays * sum;
+		while (at + 1 < n && cumulated < want)
+			cumulated += c[++at].w;
+		cast_one(t, &c[at], side, transmitted, exponent, u, cast);
+	}
+	return tally_finish(&t->tally, b, (ps & ~1u) | (uint32_t)out,
+	                    transmitted ? FF_TRANSMITTED : FF_REFLECTED, rays, rays, e);
+}
+
+static int put_link(struct ff_thread *t, uint32_t ps, const struct capture *c, size_t n,
+                    uint32_t rays, ff_cast_fn *cast, struct ff_batch *b, struct err *e)
+{
+	const struct materials *mt = &t->job->m->material;
+	uint32_t material = model_patch_material(t->job->m, ps >> 1), row[2];
+	double mean[3] = { 0 };
+	float direction[3];
+
+	for (size_t i = 0; i < n; i++)
+		v3_mad(mean, c[i].w, c[i].l, mean);
+	v3_normalise(mean);
+	for (int k = 0; k < 3; k++)
+		direction[k] = (float)mean[k];
+	for (int transmitted = 0; transmitted < 2; transmitted++) {
+		row[transmitted] = FF_NO_ROW;
+		if (!bsdf_has_lobe(mt, material, (int)(ps & 1), transmitted))
+			continue;
+		row[transmitted] = (uint32_t)b->row_side.n;
+		if (lobe_row(t, ps, c, n, transmitted, rays, cast, b, e))
+			return -1;
+	}
+	return vec_append(&b->link_target, &ps, 1, sizeof ps, e) ||
+	       vec_append(&b->link_source, &c->source, 1, sizeof c->source, e) ||
+	       vec_append(&b->link_chain, &c->chain, 1, sizeof c->chain, e) ||
+	       vec_append(&b->link_direction, direction, 3, sizeof *direction, e) ||
+	       vec_append(&b->link_row, row, 2, sizeof *row, e) ? -1 : 0;
+}
+
+/* Bins of FF_ANY are told apart by the direction: sort them into bins first. */
+static int bin_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch *b,
+                     struct err *e)
+{
+	struct vec all, bin = { 0 };
+	int bad = 0;
+
+	t->captures.n = 0;
+	if (bin_captures(t, ps, e))
+		return -1;
+	all = t->captures;
+	for (uint32_t k = 0; !bad && k < BIN_RINGS * BIN_SECTORS; k++) {
+		const struct capture *c = all.data;
+		bin.n = 0;
+		for (size_t i = 0; !bad && i < all.n; i++) {
+			double n[3];
+			ff_normal(t->job, c[i].element, (int)(ps & 1), n);
+			if (direction_bin(n, c[i].l) == k)
+				bad = vec_append(&bin, &c[i], 1, sizeof c[i], e);
+		}
+		if (!bad && bin.n)
+			bad = put_link(t, ps, bin.data, bin.n, MIN_LOBE_RAYS, cast, b, e);
+	}
+	free(bin.data);
+	return bad;
+}
+
+int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch *b,
+             struct err *e)
+{
+	const struct ff_job *j = t->job;
+	const struct capture *c;
+	uint8_t *met = mem_new(2 * j->m->patches, 1, "sources met", e);
+	double all = 0;
+	size_t own = t->captures.n;
+	int bad = !met;
+
+	c = t->captures.data;
+	for (size_t i = 0; !bad && i < own; i++) {
+		all += c[i].w;
+		if (c[i].chain == 0)
+			met[c[i].source] = 1;
+	}
+	bad = bad || probe_unseen(t, ps, met, e) || sort_captures(t, e);
+	free(met);
+	c = t->captures.data;
+	for (size_t i = 0, end; !bad && i < t->captures.n; i = end) {
+		double w = 0;
+		for (end = i; end < t->captures.n && c[end].source == c[i].source &&
+		              c[end].chain == c[i].chain; end++)
+			w += c[end].w;
+		double share = all > 0 ? fmin(1, w / all) : 0;
+		uint32_t rays = (uint32_t)(share * j->o.lobe_rays);
+		bad = put_link(t, ps, &c[i], end - i, rays > MIN_LOBE_RAYS ? rays : MIN_LOBE_RAYS,
+		               cast, b, e);
+		c = t->captures.data;
+	}
+	return bad ? bad : bin_links(t, ps, cast, b, e);
+}

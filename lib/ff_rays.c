@@ -1,0 +1,231 @@
+/* Form factors by rays: cosine-distributed directions jointly stratified with the
+ * position on the patch (Owen-scrambled Sobol points in four dimensions). */
+#include "ff_job.h"
+#include "lobe.h"
+#include "vec3.h"
+
+enum { MAX_SPLITS = 4 };
+
+struct flight {
+	double org[3], dir[3], w;
+	uint32_t chain;
+	int splits;
+};
+
+static void capture(struct ff_thread *t, uint32_t source, uint32_t chain, double w)
+{
+	struct capture c = t->now;
+
+	if (!t->job->is_source[source])
+		return;
+	c.source = source;
+	c.chain = chains_reverse(&t->tally.chains, chain, &t->tally.err);
+	c.w = w;
+	if (c.chain != CHAIN_NONE)
+		vec_append(&t->captures, &c, 1, sizeof c, &t->tally.err);
+}
+
+/* Sends a flight on by ideal event `transmitted` from a hit, or books it as cut. */
+static int go_on(struct ff_thread *t, const struct flight *in, uint32_t element, int side,
+                 const double x[3], uint32_t slot, int transmitted, double w,
+                 struct flight *out)
+{
+	uint32_t chain = chains_child(&t->tally.chains, in->chain, slot, &t->tally.err);
+	double n[3];
+
+	if (chain == CHAIN_NONE)
+		return 0;
+	if (chains_length(&t->tally.chains, chain) > t->job->o.depth) {
+		tally_rest(&t->tally, chain)->cut += w;
+		return 0;
+	}
+	ff_normal(t->job, element, transmitted ? !side : side, n);
+	for (int k = 0; k < 3; k++) {
+		out->org[k] = x[k];
+		out->dir[k] = in->dir[k];
+	}
+	if (!transmitted)
+		v3_mad(in->dir, -2 * v3_dot(in->dir, n), n, out->dir);
+	ray_leave(t->job->rays, n, out->org);
+	out->w = w;
+	out->chain = chain;
+	return 1;
+}
+
+/* Tallies a flight's landing; returns how many flights (0 to 2) go on into next[].
+ * A surface that both mirrors and passes splits the flight, the first few times;
+ * later one way is drawn and counts double, which keeps the expectation. */
+static int land(struct ff_thread *t, const struct flight *in, uint32_t es, const double x[3],
+                struct flight next[2])
+{
+	const struct ff_job *j = t->job;
+	uint32_t patch = j->m->element_patch[es >> 1], ps = 2 * patch + (es & 1);
+	uint32_t id = 4 * model_patch_material(j->m, patch) + 2 * (es & 1);
+	const uint32_t *slot = j->m->material.n ? &t->tally.chains.slot[id] : NULL;
+	int side = (int)(es & 1), n = 0, both;
+	double w = in->w;
+
+	if (!model_side_modelled(j->m, ps)) {
+		tally_rest(&t->tally, in->chain)->black += w;
+		return 0;
+	}
+	tally_hit(&t->tally, in->chain, es, w, in->dir);
+	if (t->capturing)
+		capture(t, ps, in->chain, w);
+	if (slot[0] == CHAIN_NONE && slot[1] == CHAIN_NONE)
+		return 0;
+	both = slot[0] != CHAIN_NONE && slot[1] != CHAIN_NONE;
+	int drawn = -1;
+	if (both && in->splits >= MAX_SPLITS) {
+		drawn = (int)(rng_next(&t->rng) >> 63);
+		w *= 2;
+	}
+	for (int transmitted = 0; transmitted < 2; transmitted++)
+		if (slot[transmitted] != CHAIN_NONE && drawn != !transmitted &&
+		    go_on(t, in, es >> 1, side, x, slot[transmitted], transmitted, w, &next[n])) {
+			next[n].splits = in->splits + both;
+			n++;
+		}
+	return n;
+}
+
+static void fly(struct ff_thread *t, struct flight *stack, int n)
+{
+	const struct model *m = t->job->m;
+
+	while (n > 0) {
+		struct flight f = stack[--n];
+		struct ray_hit hit;
+		ray_nearest(t->job->rays, f.org, f.dir, &hit);
+		t->rays++;
+		if (hit.triangle == RAY_MISS) {
+			tally_rest(&t->tally, f.chain)->escape += f.w;
+			continue;
+		}
+		double x[3] = { 0 };
+		for (int c = 0; c < 3; c++)
+			v3_mad(x, hit.w[c],
+			       &m->vertex[3 * (size_t)m->triangle[3 * (size_t)hit.triangle + (size_t)c]], x);
+		uint32_t element = model_locate(m, hit.triangle, hit.w);
+		n += land(t, &f, 2 * element + (uint32_t)hit.side, x, &stack[n]);
+	}
+}
+
+void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], double w,
+               uint32_t chain)
+{
+	struct flight stack[MAX_SPLITS + 3] = { { .w = w, .chain = chain } };
+
+	for (int k = 0; k < 3; k++) {
+		stack[0].org[k] = org[k];
+		stack[0].dir[k] = dir[k];
+	}
+	fly(t, stack, 1);
+}
+
+/* ---- rows ---- */
+
+struct scramble {
+	uint32_t seed[FF_DIMS];
+};
+
+static struct scramble scramble(const struct ff_job *j, uint32_t row, uint32_t replicate)
+{
+	struct scramble s;
+	uint64_t seed = rng_mix(rng_mix(j->o.seed) ^ rng_mix(((uint64_t)row << 8) | replicate));
+
+	for (int d = 0; d < FF_DIMS; d++)
+		s.seed[d] = rng_sobol_seed(seed, d);
+	return s;
+}
+
+static void sample(const struct ff_job *j, const struct scramble *s, uint32_t i,
+                   double u[FF_DIMS])
+{
+	for (int d = 0; d < FF_DIMS; d++)
+		u[d] = i < j->sobol_points
+		         ? rng_scramble(j->sobol[(size_t)i * FF_DIMS + (size_t)d], s->seed[d])
+		         : rng_scramble(rng_sobol_bits(i, d), s->seed[d]);
+}
+
+/* Casts `count` rays from a patch-side: Lambertian (exponent < 0) or as an emission
+ * lobe about the normal. */
+static void cast(struct ff_thread *t, uint32_t ps, uint32_t count, double exponent)
+{
+	const struct ff_job *j = t->job;
+	int side = (int)(ps & 1);
+
+	for (uint32_t r = 0; r < FF_REPLICATES; r++) {
+		uint32_t kind = exponent < 0 ? 0 : 1;
+		struct scramble s = scramble(j, 2 * ps + kind, r);
+		for (uint32_t i = 0; i < count / FF_REPLICATES; i++) {
+			double u[FF_DIMS], n[3], dir[3], x[3];
+			sample(j, &s, i, u);
+			uint32_t element = ff_point(j, ps >> 1, u[0], u[1], x);
+			ff_normal(j, element, side, n);
+			if (exponent < 0)
+				lobe_sample_cosine(n, &u[2], dir);
+			else
+				lobe_sample(exponent, n, n, &u[2], dir);
+			if (t->capturing) {
+				t->now = (struct capture){ .element = element };
+				for (int k = 0; k < 3; k++) {
+					t->now.x[k] = x[k];
+					t->now.l[k] = dir[k];
+				}
+			}
+			ray_leave(j->rays, n, x);
+			ff_follow(t, x, dir, 1, 0);
+		}
+		tally_replicate(&t->tally);
+	}
+}
+
+static void cast_lobe_ray(struct ff_thread *t, const struct capture *c, int side,
+                          const double dir[3], double w)
+{
+	double n[3], x[3] = { c->x[0], c->x[1], c->x[2] };
+
+	ff_normal(t->job, c->element, side, n);
+	ray_leave(t->job->rays, n, x);
+	ff_follow(t, x, dir, w, 0);
+}
+
+static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struct err *e)
+{
+	const struct ff_job *j = t->job;
+	uint32_t material = model_patch_material(j->m, ps >> 1);
+	const double *emission = &j->m->material.emission[material_at(&j->m->material, material,
+	                                                              (int)(ps & 1))];
+	uint32_t rays = j->o.rays;
+
+	for (int k = 0; k < j->m->bands; k++)
+		if (emission[k] > 0)
+			rays = j->o.rays * j->o.emitter_gain;
+	t->rng = rng_seed(j->o.seed, ps);
+	t->captures.n = 0;
+	if (j->shoots_diffuse[ps] || j->has_lobe[ps]) {
+		t->capturing = j->has_lobe[ps];
+		cast(t, ps, rays, -1);
+		t->capturing = 0;
+		struct ff_batch unused = { 0 };
+		if (tally_finish(&t->tally, j->shoots_diffuse[ps] ? b : &unused, ps, FF_DIFFUSE,
+		                 rays, rays, e))
+			return -1;
+		batch_free(&unused);
+	}
+	if (j->shoots_lobe[ps]) {
+		cast(t, ps, rays, j->m->material.emission_exponent[2 * material + (ps & 1)]);
+		if (tally_finish(&t->tally, b, ps, FF_EMISSION, rays, rays, e))
+			return -1;
+	}
+	return j->has_lobe[ps] ? ff_links(t, ps, cast_lobe_ray, b, e) : 0;
+}
+
+int ff_patch_rays(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e)
+{
+	for (uint32_t side = 0; side < 2; side++)
+		if (side_rows(t, 2 * patch + side, b, e))
+			return -1;
+	return 0;
+}

@@ -1,0 +1,503 @@
+#include "ff_tally.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct tally_far {
+	uint64_t key;      /* slot, patch-side, element in that order */
+	uint32_t column;
+	double w;
+};
+
+struct tally_arrival {
+	uint32_t slot, target;
+	double dir[3];     /* towards the source, weighted */
+};
+
+int tally_init(struct tally *t, const struct model *m, const uint8_t *has_lobe, struct err *e)
+{
+	*t = (struct tally){ .m = m, .has_lobe = has_lobe };
+	if (chains_init(&t->chains, m, e))
+		return -1;
+	t->dense = mem_new(2 * m->elements, sizeof *t->dense, "row tally", e);
+	t->replicate = mem_new(2 * m->patches, sizeof *t->replicate, "row tally", e);
+	t->square = mem_new(2 * m->patches, sizeof *t->square, "row tally", e);
+	t->seen = mem_new(2 * m->patches, 1, "row tally", e);
+	return t->dense && t->replicate && t->square && t->seen ? 0 : -1;
+}
+
+void tally_free(struct tally *t)
+{
+	void *array[] = { t->dense, t->replicate, t->square, t->seen, t->touched.data,
+		t->far.data, t->sort.data, t->rest.data, t->slot_chain.data,
+		t->chain_slot.data, t->arrival.data };
+
+	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
+		free(array[i]);
+	chains_free(&t->chains);
+	*t = (struct tally){ 0 };
+}
+
+/* ---- while a row is cast ---- */
+
+/* Slot of a chain in this row, made if new. */
+static uint32_t slot_of(struct tally *t, uint32_t chain)
+{
+	struct tally_rest none = { 0 };
+
+	if (chain >= t->chain_slot.n) {
+		size_t more = t->chains.n - t->chain_slot.n;
+		if (vec_reserve(&t->chain_slot, more, sizeof(uint32_t), &t->err))
+			return 0;
+		memset((uint32_t *)t->chain_slot.data + t->chain_slot.n, 0, more * sizeof(uint32_t));
+		t->chain_slot.n += more;
+	}
+	uint32_t *slot = (uint32_t *)t->chain_slot.data + chain;
+	if (*slot == 0) {
+		if (vec_append(&t->slot_chain, &chain, 1, sizeof chain, &t->err) ||
+		    vec_append(&t->rest, &none, 1, sizeof none, &t->err))
+			return 0;
+		*slot = (uint32_t)t->rest.n;
+	}
+	return *slot - 1;
+}
+
+struct tally_rest *tally_rest(struct tally *t, uint32_t chain)
+{
+	static struct tally_rest spill; /* only after running out of memory */
+	uint32_t slot = slot_of(t, chain);
+
+	return slot < t->rest.n ? (struct tally_rest *)t->rest.data + slot : &spill;
+}
+
+static void note_arrival(struct tally *t, uint32_t chain, uint32_t target, double w,
+                         const double dir[3])
+{
+	struct tally_arrival a = { slot_of(t, chain), target,
+	                           { -w * dir[0], -w * dir[1], -w * dir[2] } };
+
+	vec_append(&t->arrival, &a, 1, sizeof a, &t->err);
+}
+
+void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
+               const double dir[3])
+{
+	uint32_t element = element_side >> 1, side = element_side & 1;
+	uint32_t p = t->m->element_patch[element], ps = 2 * p + side;
+
+	if (chain == 0) {
+		t->dense[element_side] += w;
+		t->replicate[ps] += w;
+		if (!t->seen[ps]) {
+			t->seen[ps] = 1;
+			vec_append(&t->touched, &ps, 1, sizeof ps, &t->err);
+		}
+	} else {
+		const uint32_t *start = t->m->patch_start;
+		uint64_t place = 2 * (uint64_t)start[p] + (element - start[p]) +
+		                 (side ? start[p + 1] - start[p] : 0);
+		struct tally_far f = { slot_of(t, chain) * 2 * (uint64_t)t->m->elements + place,
+		                       element_side, w };
+		vec_append(&t->far, &f, 1, sizeof f, &t->err);
+	}
+	if (t->has_lobe[ps])
+		note_arrival(t, chain, ps, w, dir);
+}
+
+void tally_replicate(struct tally *t)
+{
+	const uint32_t *touched = t->touched.data;
+	double escape = tally_rest(t, 0)->escape, now = escape - t->escape_before;
+
+	for (size_t i = 0; i < t->touched.n; i++) {
+		double x = t->replicate[touched[i]];
+		t->square[touched[i]] += x * x;
+		t->replicate[touched[i]] = 0;
+	}
+	t->escape_square += now * now;
+	t->escape_before = escape;
+	t->replicates++;
+}
+
+/* ---- finishing a row ---- */
+
+static int by_number(const void *a, const void *b)
+{
+	uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+	return (x > y) - (x < y);
+}
+
+static int put_value(struct ff_batch *b, uint32_t column, double w, double *sum, struct err *e)
+{
+	float f = (float)w;
+
+	*sum += b->f64 ? w : (double)f;
+	if (vec_append(&b->column, &column, 1, sizeof column, e))
+		return -1;
+	return b->f64 ? vec_append(&b->value, &w, 1, sizeof w, e)
+	              : vec_append(&b->value, &f, 1, sizeof f, e);
+}
+
+/* Variance of one receiver's share of the row from its replicates, or, where
+ * there are none, of as many independent samples. */
+static double share_variance(const struct tally *t, double sum, double square, double total,
+                             uint32_t samples)
+{
+	double r = t->replicates, f = sum / total;
+
+	if (t->replicates >= 2)
+		return fmax(0, square - sum * sum / r) / (r - 1) * r / (total * total);
+	return f * (1 - f) / samples;
+}
+
+/* Chain 0: scans the elements of the patch-sides that were hit. Clears them. */
+static int finish_near(struct tally *t, struct ff_batch *b, uint32_t samples, double total,
+                       double *sum, double *variance, struct err *e)
+{
+	uint32_t *touched = t->touched.data;
+
+	if (t->touched.n)
+		qsort(touched, t->touched.n, sizeof *touched, by_number);
+	for (size_t i = 0; i < t->touched.n; i++) {
+		uint32_t ps = touched[i], p = ps >> 1;
+		double patch_sum = 0;
+		for (uint32_t el = t->m->patch_start[p]; el < t->m->patch_start[p + 1]; el++) {
+			double *w = &t->dense[2 * (size_t)el + (ps & 1)];
+			if (*w > 0 && put_value(b, 2 * el + (ps & 1), *w, sum, e))
+				return -1;
+			patch_sum += *w;
+			*w = 0;
+		}
+		*variance += share_variance(t, patch_sum, t->square[ps], total, samples);
+		t->square[ps] = t->replicate[ps] = 0;
+		t->seen[ps] = 0;
+	}
+	return 0;
+}
+
+/* Least-significant-digit radix sort by key, 11 bits a pass; stable. */
+static int sort_far(struct tally *t, struct err *e)
+{
+	size_t n = t->far.n;
+	uint64_t all = 0;
+
+	t->sort.n = 0;
+	if (vec_reserve(&t->sort, n, sizeof(struct tally_far), e))
+		return -1;
+	struct tally_far *from = t->far.data, *to = t->sort.data;
+	for (size_t i = 0; i < n; i++)
+		all |= from[i].key;
+	for (int shift = 0; shift < 64 && all >> shift; shift += 11) {
+		size_t at[2048] = { 0 }, sum = 0;
+		for (size_t i = 0; i < n; i++)
+			at[from[i].key >> shift & 2047]++;
+		for (int k = 0; k < 2048; k++) {
+			size_t c = at[k];
+			at[k] = sum;
+			sum += c;
+		}
+		for (size_t i = 0; i < n; i++)
+			to[at[from[i].key >> shift & 2047]++] = from[i];
+		struct tally_far *swap = from;
+		from = to;
+		to = swap;
+	}
+	if (from != t->far.data) {
+		struct vec swap = t->far;
+		t->far = t->sort;
+		t->far.n = n;
+		t->sort = swap;
+	}
+	return 0;
+}
+
+static int by_target(const void *a, const void *b)
+{
+	const struct tally_arrival *x = a, *y = b;
+	if (x->slot != y->slot)
+		return x->slot < y->slot ? -1 : 1;
+	return (x->target > y->target) - (x->target < y->target);
+}
+
+/* Appends the mean directions of one slot's arrivals, which are sorted by slot
+ * and target. */
+static int put_arrivals(struct tally *t, struct ff_batch *b, uint32_t slot, struct err *e)
+{
+	const struct tally_arrival *a = t->arrival.data;
+	size_t n = t->arrival.n, i = 0, hi = n;
+
+	while (i < hi) {
+		size_t mid = i + (hi - i) / 2;
+		if (a[mid].slot < slot)
+			i = mid + 1;
+		else
+			hi = mid;
+	}
+	while (i < n && a[i].slot == slot) {
+		uint32_t target = a[i].target;
+		double d[3] = { 0 }, l;
+		for (; i < n && a[i].slot == slot && a[i].target == target; i++)
+			for (int k = 0; k < 3; k++)
+				d[k] += a[i].dir[k];
+		l = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+		float f[3] = { 0, 0, 1 };
+		for (int k = 0; k < 3 && l > 0; k++)
+			f[k] = (float)(d[k] / l);
+		if (vec_append(&b->arrival_target, &target, 1, sizeof target, e) ||
+		    vec_append(&b->arrival_direction, f, 3, sizeof *f, e))
+			return -1;
+	}
+	return 0;
+}
+
+static int put_block(struct tally *t, struct ff_batch *b, uint32_t slot, struct err *e)
+{
+	const struct tally_rest *r = (const struct tally_rest *)t->rest.data + slot;
+	uint64_t entries = b->column.n, arrivals;
+	uint32_t chain = ((const uint32_t *)t->slot_chain.data)[slot];
+
+	if (put_arrivals(t, b, slot, e))
+		return -1;
+	arrivals = b->arrival_target.n;
+	return vec_append(&b->block_chain, &chain, 1, sizeof chain, e) ||
+	       vec_append(&b->block_start, &entries, 1, sizeof entries, e) ||
+	       vec_append(&b->block_arrival, &arrivals, 1, sizeof arrivals, e) ||
+	       vec_append(&b->escape, &r->escape, 1, sizeof r->escape, e) ||
+	       vec_append(&b->black, &r->black, 1, sizeof r->black, e) ||
+	       vec_append(&b->lost, &r->lost, 1, sizeof r->lost, e) ||
+	       vec_append(&b->cut, &r->cut, 1, sizeof r->cut, e) ? -1 : 0;
+}
+
+int chains_compare(const struct chains *c, uint32_t a, uint32_t b)
+{
+	uint32_t la = chains_length(c, a), lb = chains_length(c, b);
+
+	if (la != lb)
+		return la < lb ? -1 : 1;
+	for (uint32_t i = 0; i < c->events; i++) {
+		uint32_t x = chains_count(c, a)[i], y = chains_count(c, b)[i];
+		if (x != y)
+			return x < y ? -1 : 1;
+	}
+	return 0;
+}
+
+struct slot_order {
+	const struct chains *chains;
+	uint32_t chain, slot;
+};
+
+static int by_chain(const void *a, const void *b)
+{
+	const struct slot_order *x = a, *y = b;
+	return chains_compare(x->chains, x->chain, y->chain);
+}
+
+/* Blocks of chains beyond 0, in an order that does not depend on their numbers. */
+static int finish_far(struct tally *t, struct ff_batch *b, struct err *e)
+{
+	size_t slots = t->rest.n, total = 2 * t->m->elements;
+	struct slot_order *order = mem_new(slots, sizeof *order, "row blocks", e);
+	const struct tally_far *f;
+	int bad = !order || sort_far(t, e);
+
+	f = t->far.data;
+	for (uint32_t s = 1; !bad && s < slots; s++)
+		order[s] = (struct slot_order){ &t->chains,
+			((const uint32_t *)t->slot_chain.data)[s], s };
+	if (!bad && slots > 2)
+		qsort(order + 1, slots - 1, sizeof *order, by_chain);
+	for (size_t k = 1; !bad && k < slots; k++) {
+		uint64_t begin = order[k].slot * (uint64_t)total, end = begin + total;
+		size_t i = 0, hi = t->far.n;
+		double sum = 0;
+		while (i < hi) {
+			size_t mid = i + (hi - i) / 2;
+			if (f[mid].key < begin)
+				i = mid + 1;
+			else
+				hi = mid;
+		}
+		while (!bad && i < t->far.n && f[i].key < end) {
+			uint64_t key = f[i].key;
+			uint32_t column = f[i].column;
+			double w = 0;
+			for (; i < t->far.n && f[i].key == key; i++)
+				w += f[i].w;
+			bad = put_value(b, column, w, &sum, e);
+		}
+		bad = bad || put_block(t, b, order[k].slot, e);
+	}
+	free(order);
+	return bad ? -1 : 0;
+}
+
+static void clear(struct tally *t)
+{
+	const uint32_t *chain = t->slot_chain.data;
+
+	for (size_t s = 0; s < t->slot_chain.n; s++)
+		((uint32_t *)t->chain_slot.data)[chain[s]] = 0;
+	t->slot_chain.n = t->rest.n = t->far.n = t->arrival.n = t->touched.n = 0;
+	t->escape_before = t->escape_square = 0;
+	t->replicates = 0;
+}
+
+static int put_row(struct ff_batch *b, uint32_t side, enum ff_row_kind kind, uint32_t samples,
+                   double scale, double residual, double error, struct err *e)
+{
+	uint64_t blocks = b->block_chain.n;
+	uint8_t k = (uint8_t)kind;
+
+	return vec_append(&b->row_side, &side, 1, sizeof side, e) ||
+	       vec_append(&b->row_kind, &k, 1, sizeof k, e) ||
+	       vec_append(&b->row_samples, &samples, 1, sizeof samples, e) ||
+	       vec_append(&b->row_scale, &scale, 1, sizeof scale, e) ||
+	       vec_append(&b->row_residual, &residual, 1, sizeof residual, e) ||
+	       vec_append(&b->row_error, &error, 1, sizeof error, e) ||
+	       vec_append(&b->row_block, &blocks, 1, sizeof blocks, e) ? -1 : 0;
+}
+
+/* Start arrays hold ends while a batch grows and a leading 0. */
+static int put_zero_starts(struct ff_batch *b, struct err *e)
+{
+	const uint64_t zero = 0;
+
+	if (b->row_block.n)
+		return 0;
+	return vec_append(&b->row_block, &zero, 1, sizeof zero, e) ||
+	       vec_append(&b->block_start, &zero, 1, sizeof zero, e) ||
+	       vec_append(&b->block_arrival, &zero, 1, sizeof zero, e) ? -1 : 0;
+}
+
+int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
+                 enum ff_row_kind kind, uint32_t samples, double total, struct err *e)
+{
+	struct tally_rest *r = tally_rest(t, 0);
+	double sum = 0, variance = 0;
+
+	if (t->err.set)
+		return err_set(e, "%s", t->err.text);
+	if (put_zero_starts(b, e) || finish_near(t, b, samples, total, &sum, &variance, e))
+		return -1;
+	variance += share_variance(t, r->escape, t->escape_square, total, samples);
+	sum += r->escape + r->black + r->lost + r->cut;
+	if (t->arrival.n)
+		qsort(t->arrival.data, t->arrival.n, sizeof(struct tally_arrival), by_target);
+	if (put_block(t, b, 0, e) || finish_far(t, b, e))
+		return -1;
+	clear(t);
+	return put_row(b, row_side, kind, samples, sum > 0 ? 1 / sum : 0, 1 - sum / total,
+	               sqrt(variance), e);
+}
+
+/* ---- batches ---- */
+
+static int map_chain(uint32_t *chain, const struct chains *local, struct vec *map,
+                     struct chains *whole, struct err *e)
+{
+	const uint32_t none = CHAIN_NONE;
+
+	while (map->n < local->n)
+		if (vec_append(map, &none, 1, sizeof none, e))
+			return -1;
+	uint32_t *to = (uint32_t *)map->data + *chain;
+	if (*to == CHAIN_NONE)
+		*to = chains_find(whole, chains_count(local, *chain), e);
+	*chain = *to;
+	return *to == CHAIN_NONE ? -1 : 0;
+}
+
+struct link {
+	uint32_t target, source, chain, row[2], order;
+	float direction[3];
+};
+
+static int by_link(const void *a, const void *b)
+{
+	const struct link *x = a, *y = b;
+	if (x->target != y->target)
+		return x->target < y->target ? -1 : 1;
+	if (x->source != y->source)
+		return x->source < y->source ? -1 : 1;
+	if (x->chain != y->chain)
+		return x->chain < y->chain ? -1 : 1;
+	return (x->order > y->order) - (x->order < y->order);
+}
+
+static int sort_links(struct ff_batch *b, struct err *e)
+{
+	size_t n = b->link_target.n;
+	struct link *l = mem_new(n, sizeof *l, "links", e);
+	uint32_t *target = b->link_target.data, *source = b->link_source.data;
+	uint32_t *chain = b->link_chain.data, *row = b->link_row.data;
+	float *direction = b->link_direction.data;
+
+	if (!l)
+		return -1;
+	for (size_t i = 0; i < n; i++) {
+		l[i] = (struct link){ target[i], source[i], chain[i],
+		                      { row[2 * i], row[2 * i + 1] }, (uint32_t)i, { 0 } };
+		memcpy(l[i].direction, &direction[3 * i], sizeof l[i].direction);
+	}
+	if (n)
+		qsort(l, n, sizeof *l, by_link);
+	for (size_t i = 0; i < n; i++) {
+		target[i] = l[i].target;
+		source[i] = l[i].source;
+		chain[i] = l[i].chain;
+		memcpy(&row[2 * i], l[i].row, sizeof l[i].row);
+		memcpy(&direction[3 * i], l[i].direction, sizeof l[i].direction);
+	}
+	free(l);
+	return 0;
+}
+
+int batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *map,
+                   struct chains *whole, struct err *e)
+{
+	for (size_t i = 0; i < b->block_chain.n; i++)
+		if (map_chain((uint32_t *)b->block_chain.data + i, local, map, whole, e))
+			return -1;
+	for (size_t i = 0; i < b->link_chain.n; i++)
+		if (map_chain((uint32_t *)b->link_chain.data + i, local, map, whole, e))
+			return -1;
+	return sort_links(b, e);
+}
+
+struct ff batch_view(const struct ff_batch *b)
+{
+	struct ff f = {
+		.rows = b->row_side.n, .row_side = b->row_side.data,
+		.row_kind = b->row_kind.data, .row_samples = b->row_samples.data,
+		.row_scale = b->row_scale.data, .row_residual = b->row_residual.data,
+		.row_error = b->row_error.data, .row_block = b->row_block.data,
+		.blocks = b->block_chain.n, .block_chain = b->block_chain.data,
+		.block_start = b->block_start.data, .block_escape = b->escape.data,
+		.block_black = b->black.data, .block_lost = b->lost.data,
+		.block_cut = b->cut.data, .block_arrival = b->block_arrival.data,
+		.entries = b->column.n, .column = b->column.data,
+		.value = b->f64 ? NULL : b->value.data, .value64 = b->f64 ? b->value.data : NULL,
+		.arrivals = b->arrival_target.n, .arrival_target = b->arrival_target.data,
+		.arrival_direction = b->arrival_direction.data,
+		.links = b->link_target.n, .link_target = b->link_target.data,
+		.link_source = b->link_source.data, .link_chain = b->link_chain.data,
+		.link_direction = b->link_direction.data, .link_row = b->link_row.data,
+	};
+	return f;
+}
+
+void batch_free(struct ff_batch *b)
+{
+	struct vec *v[] = { &b->row_side, &b->row_kind, &b->row_samples, &b->row_scale,
+		&b->row_residual, &b->row_error, &b->row_block, &b->block_chain,
+		&b->block_start, &b->escape, &b->black, &b->lost, &b->cut, &b->block_arrival,
+		&b->column, &b->value, &b->arrival_target, &b->arrival_direction,
+		&b->link_target, &b->link_source, &b->link_chain, &b->link_direction,
+		&b->link_row };
+
+	for (size_t i = 0; i < sizeof v / sizeof *v; i++)
+		free(v[i]->data);
+	*b = (struct ff_batch){ .f64 = b->f64 };
+}

@@ -1,0 +1,85 @@
+/* Tallies: where the flux of one row lands, gathered and sorted into blocks. */
+#ifndef TWOPASS_FF_TALLY_H
+#define TWOPASS_FF_TALLY_H
+
+#include "chain.h"
+#include "ff.h"
+#include "mem.h"
+#include "model.h"
+
+/* Flux of a chain that reaches no modelled element-side. */
+struct tally_rest {
+	double escape, black, lost, cut;
+};
+
+/* One thread's scratch space; a row at a time. */
+struct tally {
+	const struct model *m;
+	const uint8_t *has_lobe;   /* [2P] patch-sides whose arrivals keep a direction */
+	struct chains chains;      /* this thread's own numbering */
+
+	double *dense;             /* [2E] chain 0 */
+	double *replicate;         /* [2P] chain 0, the current replicate */
+	double *square;            /* [2P] sums of squares over replicates */
+	uint8_t *seen;             /* [2P] */
+	struct vec touched;        /* uint32_t patch-sides seen in chain 0 */
+	double escape_before, escape_square;
+	int replicates;
+
+	struct vec far;            /* struct tally_far: longer chains */
+	struct vec sort;           /* scratch for sorting them */
+	struct vec rest;           /* struct tally_rest by slot */
+	struct vec slot_chain;     /* uint32_t chain by slot; slot 0 = chain 0 */
+	struct vec chain_slot;     /* uint32_t 1 + slot by chain, 0 = unused */
+	struct vec arrival;        /* struct tally_arrival */
+	struct err err;            /* out of memory, checked once a row */
+};
+
+/* Growing arrays of a struct ff. */
+struct ff_batch {
+	int f64;
+	struct vec row_side, row_kind, row_samples, row_scale, row_residual, row_error;
+	struct vec row_block, block_chain, block_start, escape, black, lost, cut;
+	struct vec block_arrival, column, value;
+	struct vec arrival_target, arrival_direction;
+	struct vec link_target, link_source, link_chain, link_direction, link_row;
+};
+
+int tally_init(struct tally *t, const struct model *m, const uint8_t *has_lobe,
+               struct err *e);
+void tally_free(struct tally *t);
+
+/* Weight w of the row's flux arriving by `chain` on an element-side, travelling
+ * along dir (unit). */
+void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
+               const double dir[3]);
+
+/* What became of flux of `chain` that lands nowhere. The pointer is good until
+ * the next call with a chain not seen in this row. */
+struct tally_rest *tally_rest(struct tally *t, uint32_t chain);
+
+/* Closes a replicate: equal, independently scrambled parts of a row's samples,
+ * whose spread gives the row's standard error. */
+void tally_replicate(struct tally *t);
+
+/* Appends the row to the batch and clears the tally. total: the weight that was
+ * cast, from which the raw residual follows. The standard error comes from the
+ * replicates where there are two or more, otherwise it is that of `samples`
+ * random samples. O(hits + log) . 0, or -1 and e. */
+int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
+                 enum ff_row_kind kind, uint32_t samples, double total, struct err *e);
+
+/* Chain numbers of the batch and order of links: local -> whole. `map` (vec of
+ * uint32_t, CHAIN_NONE = not met yet) belongs to the thread whose chains these
+ * are. Called in row order, so numbers do not depend on threads. */
+int batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *map,
+                   struct chains *whole, struct err *e);
+
+/* The batch seen as a struct ff (borrowed arrays). */
+struct ff batch_view(const struct ff_batch *b);
+void batch_free(struct ff_batch *b);
+
+/* Order of chains by length, then counts: independent of their numbers. */
+int chains_compare(const struct chains *c, uint32_t a, uint32_t b);
+
+#endif
