@@ -5,6 +5,7 @@ import math
 import random
 import sys
 
+sys.dont_write_bytecode = True
 from gltf_writer import Scene, Shape
 
 X, Y, Z = 8.0, 3.0, 6.0  # the room, metres; Y is up
@@ -123,11 +124,11 @@ def sofa(s, m, name, seats, x, z, degrees, cloth):
     soft = Shape()
     for k in range(seats):
         a = -wide / 2 + .7 * k
-        soft.join(cushion((a + .005, .28, -.22), (a + .695, .47, .47), 56, 28))
-        soft.join(cushion((a + .005, .40, -.46), (a + .695, .92, -.20), 56, 28))
+        soft.join(cushion((a + .005, .28, -.22), (a + .695, .47, .47), 60, 30))
+        soft.join(cushion((a + .005, .40, -.46), (a + .695, .92, -.20), 60, 30))
     for side in (-1, 1):
         a = side * (wide / 2 + .1)
-        soft.join(cushion((a - .1, .28, -.45), (a + .1, .66, .46), 56, 28))
+        soft.join(cushion((a - .1, .28, -.45), (a + .1, .66, .46), 60, 30))
     instance(s, name + " cushions", s.mesh(name + " cushions", soft, m[cloth]), x, 0, z, degrees)
 
 

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 
+sys.dont_write_bytecode = True
 from gltf_writer import Scene, Shape
 
 HERE = os.path.dirname(os.path.abspath(__file__))

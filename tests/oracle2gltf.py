@@ -1,0 +1,108 @@
+#!/usr/bin/python3
+"""Turns a scene of tests/data/global_illumination.json into glTF:
+oracle2gltf.py ID OUT.gltf, or oracle2gltf.py --list.
+
+Each face becomes a node of its own name; rectangles keep their float64 corners (a
+unit square under a matrix), other polygons are rounded to float32. An exitance E
+becomes the radiance E/pi. A material whose back has no coefficient and no emission,
+and whose front does not transmit, is one-sided."""
+import json
+import math
+import os
+import sys
+
+import numpy as np
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "scenes"))
+from gltf_writer import Scene, Shape
+
+DATA = os.path.join(os.path.dirname(os.path.abspath(__file__)), "data", "global_illumination.json")
+KEYS = ("rho_d", "tau_d", "rho_s", "tau_s")
+
+
+def oracles():
+    with open(DATA, encoding="utf-8") as f:
+        return {o["id"]: o for o in json.load(f)["oracles"]}
+
+
+def unsupported(oracle):
+    """Why an oracle cannot become a glTF file, or None."""
+    if not oracle["faces"]:
+        return "needs an emission that varies over the surface; no faces are given"
+    return None
+
+
+def coefficients(side):
+    """The extras of one side of an oracle's material."""
+    keys = {k: side.get(k, 0) for k in KEYS}
+    n = side.get("n")
+    if n is not None:
+        keys["alpha"] = keys["beta"] = n
+    return keys
+
+
+def material(scene, name, front, back):
+    extras = coefficients(front)
+    if front.get("E"):
+        extras["emission_front"] = front["E"] / math.pi
+    dark = not any(back.get(k) for k in KEYS) and not back.get("E")
+    if dark and not front.get("tau_d") and not front.get("tau_s"):
+        return scene.material(name, extras, colour=(.5, .5, .5))
+    extras["back"] = coefficients(back)
+    if back.get("E"):
+        extras["emission_back"] = back["E"] / math.pi
+    return scene.material(name, extras, colour=(.5, .5, .5), double_sided=True)
+
+
+def is_rectangle(corners):
+    if len(corners) != 4:
+        return False
+    a, b, c, d = [np.array(p, float) for p in corners]
+    size = np.abs(b - a).max() + np.abs(d - a).max()
+    u, v = b - a, d - a
+    return (np.abs(a + c - b - d).max() < 1e-12 * size and
+            abs(u @ v) < 1e-12 * np.linalg.norm(u) * np.linalg.norm(v))
+
+
+def scene_of(name, materials, faces, cameras=()):
+    """materials: {name: {"front": {E, rho_d, …, n}, "back": {…}}}; faces: name, verts,
+    mat; cameras: (name, eye, target, yfov)."""
+    s = Scene(name)
+    known = {m: material(s, m, sides["front"], sides.get("back", {}))
+             for m, sides in materials.items()}
+    for face in faces:
+        if is_rectangle(face["verts"]):
+            s.rectangle(face["name"], face["verts"], known[face["mat"]])
+        else:
+            s.shape(face["name"], Shape().polygon(*face["verts"]), known[face["mat"]])
+    for view, eye, target, yfov in cameras:
+        s.camera(view, eye, target, yfov, 1, (0, 0, 1))
+    return s
+
+
+# Seen from within the unit cube, for expectations on every pixel.
+INSIDE = [("corner", (.1, .15, .2), (.9, .8, .7), 80), ("floor", (.5, .45, .9), (.52, .5, 0), 60),
+          ("mirror", (.3, .6, .3), (.5, .4, 1), 70), ("wall", (.8, .5, .5), (0, .4, .45), 75)]
+
+
+def convert(oracle, path):
+    views = INSIDE if any(e.get("stat") == "every_pixel" for e in oracle["expect"]) else ()
+    scene_of(oracle["id"], oracle["materials"], oracle["faces"], views).write(path)
+
+
+def main():
+    known = oracles()
+    if sys.argv[1:] == ["--list"]:
+        print("\n".join(known))
+        return
+    if len(sys.argv) != 3 or sys.argv[1] not in known:
+        sys.exit("usage: oracle2gltf.py ID OUT.gltf, or --list")
+    reason = unsupported(known[sys.argv[1]])
+    if reason:
+        sys.exit(f"oracle2gltf.py: {sys.argv[1]}: {reason}")
+    convert(known[sys.argv[1]], sys.argv[2])
+
+
+if __name__ == "__main__":
+    main()
