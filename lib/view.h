@@ -1,0 +1,65 @@
+/* The view-dependent pass: pictures of a solved scene.
+ *
+ * Radiance towards the eye = emission + M / pi + directional part. M comes from
+ * the interpolated irradiance of both sides and holds every path up to its last
+ * diffuse event; the directional part is found by following rays (the specular
+ * tail), and emission is added once, at each surface that a tail meets. Cost:
+ * O(pixels samples log triangles), times the tails' branches. */
+#ifndef TWOPASS_VIEW_H
+#define TWOPASS_VIEW_H
+
+#include <stdint.h>
+
+#include "camera.h"
+#include "err.h"
+#include "image.h"
+#include "model.h"
+#include "par.h"
+#include "ray.h"
+#include "reconstruct.h"
+
+/* Layers beside R, G, B. Z, N, element and patch are those at the pixel's centre:
+ * Z the camera depth (infinite where nothing is seen), N the geometric normal of
+ * the side seen, element and patch their numbers (-1 where nothing is seen). */
+enum {
+	VIEW_DIFFUSE = 1, VIEW_DIRECTIONAL = 2, VIEW_EMISSION = 4, VIEW_Z = 8,
+	VIEW_N = 16, VIEW_ELEMENT = 32, VIEW_PATCH = 64, VIEW_ALL = 127
+};
+
+struct view_options {
+	int samples;       /* a pixel; 1 = its centre, else stratified over it */
+	int lobe_samples;  /* of a finite lobe; 0 = one ray in the mirror or
+	                      straight-through direction (the paper) */
+	int depth;         /* directional events followed */
+	double cutoff;     /* tails of less than this part of a pixel are cut */
+	unsigned layers;   /* VIEW_... */
+	int threads;
+};
+
+struct view_stats {
+	uint64_t rays;
+	double radiance;   /* mean over pixels, summed over bands */
+	double cut;        /* bound on what cut tails would have added to it; infinite
+	                      where no bound exists */
+};
+
+struct view_scene;
+
+/* What all views share: tables of materials and the brightest radiance. m, rays
+ * and h must outlive it. NULL and e on failure. O(elements). */
+struct view_scene *view_scene_new(const struct model *m, const struct ray_scene *rays,
+                                  const struct reconstruction *h, struct err *e);
+void view_scene_free(struct view_scene *v);
+
+/* The mask of a comma-separated list of layers (diffuse, directional, emission, Z,
+ * N, element, patch, all) into layers. 0, or -1 with an unknown name. */
+int view_parse_layers(const char *list, unsigned *layers);
+
+/* Renders into a new picture: channels R, G, B (one band: all the same; otherwise
+ * bands 0, 1, 2, or the last there is), `band.0` and so on unless there are 1 or 3
+ * bands, and the layers. The same bytes for any number of threads. */
+int view_render(const struct view_scene *v, const struct view_frame *f,
+                const struct view_options *o, const struct progress *progress,
+                struct image *picture, struct view_stats *stats, struct err *e);
+
+#endif

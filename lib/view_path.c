@@ -1,0 +1,257 @@
+#include "view_path.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "bsdf.h"
+#include "lobe.h"
+#include "rng.h"
+#include "vec3.h"
+
+/* Backs of one-sided materials in a row that a ray may pass. */
+enum { PASSES_MAX = 4096 };
+
+/* A surface point as a ray meets it. */
+struct point {
+	uint32_t element, material;
+	int side;
+	double x[3], n[3];  /* n: front normal */
+	double w[3];        /* weights of the element's corners */
+	double cosine;      /* |n.dir| */
+};
+
+size_t view_stack_size(const struct view_options *o)
+{
+	/* Every level leaves at most one branch waiting for each one it goes on with,
+	 * and only one level of a path multiplies its branches. */
+	return 2 * (size_t)o->lobe_samples + 2 * (size_t)o->depth + 4;
+}
+
+/* 1 if the ray meets a surface. */
+static int meet(const struct view_scene *v, const double org[3], const double dir[3],
+                struct point *p)
+{
+	const struct model *m = v->m;
+	struct ray_hit hit;
+
+	ray_nearest(v->rays, org, dir, &hit);
+	if (hit.triangle == RAY_MISS)
+		return 0;
+	p->element = model_locate(m, hit.triangle, hit.w);
+	p->material = m->surface.material[m->triangle_surface[hit.triangle]];
+	p->side = hit.side;
+	memcpy(p->n, &m->element_normal[3 * (size_t)p->element], sizeof p->n);
+	memcpy(p->w, hit.w, sizeof p->w);
+	p->cosine = fabs(v3_dot(p->n, dir));
+	return 1;
+}
+
+/* The point itself, from the corners: closer to the plane than along the ray. */
+static void locate(const struct view_scene *v, struct point *p)
+{
+	const uint32_t *c = &v->m->element[3 * (size_t)p->element];
+
+	for (size_t k = 0; k < 3; k++)
+		p->x[k] = p->w[0] * v->m->vertex[3 * (size_t)c[0] + k] +
+		          p->w[1] * v->m->vertex[3 * (size_t)c[1] + k] +
+		          p->w[2] * v->m->vertex[3 * (size_t)c[2] + k];
+}
+
+static void leave(const struct view_scene *v, const struct point *p, int side,
+                  double x[3])
+{
+	double n[3];
+
+	for (int k = 0; k < 3; k++)
+		n[k] = side == FRONT ? p->n[k] : -p->n[k];
+	memcpy(x, p->x, sizeof p->x);
+	ray_leave(v->rays, n, x);
+}
+
+/* As meet, going through the backs of one-sided materials if `passes`. Returns 0
+ * where nothing, or only a black back, is met. */
+static int see(const struct view_scene *v, const double org[3], const double dir[3],
+               int passes, struct point *p, uint64_t *rays)
+{
+	double from[3];
+
+	++*rays;
+	if (!meet(v, org, dir, p))
+		return 0;
+	for (int i = 0; v->side[2 * p->material + (uint32_t)p->side].black; i++) {
+		if (!passes || i == PASSES_MAX)
+			return 0;
+		locate(v, p);
+		leave(v, p, FRONT, from);
+		++*rays;
+		if (!meet(v, from, dir, p))
+			return 0;
+	}
+	return 1;
+}
+
+/* Adds what the point itself sends: emission and M / pi. */
+static void add_radiance(struct view_walker *w, const struct view_branch *b,
+                         const struct point *p)
+{
+	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
+	size_t bands = (size_t)w->v->m->bands;
+	double h[2 * BANDS_MAX], l[BANDS_MAX];
+	const double *here = h + (p->side == FRONT ? 0 : bands);
+	const double *across = h + (p->side == FRONT ? bands : 0);
+	double *diffuse = b->depth ? w->directional : w->diffuse;
+	double *emission = b->depth ? w->directional : w->emission;
+
+	reconstruction_at(w->v->h, p->element, p->w, h);
+	for (size_t i = 0; i < bands; i++)
+		diffuse[i] += b->weight[i] * (s->here[i] * here[i] + s->across[i] * across[i]);
+	if (!s->emits)
+		return;
+	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] };
+	bsdf_emission(w->v->m, p->material, p->n, out, l);
+	for (size_t i = 0; i < bands; i++)
+		emission[i] += b->weight[i] * l[i];
+}
+
+/* Puts a branch that carries `scale` times `coefficient` of b's weight on the
+ * stack, or cuts it and books its bound. */
+static void push(struct view_walker *w, const struct view_branch *b,
+                 struct view_branch *next, const double *coefficient, double scale)
+{
+	int bands = w->v->m->bands;
+	double most = 0;
+
+	next->depth = b->depth + 1;
+	for (int i = 0; i < bands; i++) {
+		next->weight[i] = b->weight[i] * coefficient[i] * scale;
+		most = fmax(most, next->weight[i]);
+	}
+	if (next->depth <= w->o->depth && most >= w->o->cutoff && most > 0) {
+		w->stack[w->waiting++] = *next;
+		return;
+	}
+	for (int i = 0; i < bands; i++)
+		if (next->weight[i] > 0)
+			w->cut[i] += next->weight[i] * w->v->ceiling[i];
+}
+
+/* N samples of a finite lobe about `axis` on the side with unit normal `normal`.
+ * Weights: lib/bsdf's f cos theta_i over the density cos^k gamma / N_k(theta_o)
+ * (paper) or (k + 1) cos^k gamma / 2 pi (reciprocal). */
+static void sample_lobe(struct view_walker *w, const struct view_branch *b,
+                        const struct point *p, const struct view_lobe *lobe,
+                        const double axis[3], const double normal[3],
+                        struct view_branch *next)
+{
+	int reciprocal = w->v->m->lobe == LOBE_RECIPROCAL, n = 1;
+	double cos_o = fmax(p->cosine, 1e-14);
+	double norm = reciprocal ? 0 : lobe_normaliser(lobe->k, cos_o);
+
+	if (!b->lobes) {
+		double most = 0;
+		for (int i = 0; i < w->v->m->bands; i++)
+			most = fmax(most, b->weight[i] * lobe->coefficient[i]);
+		n = (int)fmax(1, fmin(1, most) * w->o->lobe_samples + .5);
+	}
+	next->lobes = 1;
+	for (int i = 0; i < n; i++) {
+		next->index = b->lobes ? b->index
+		                       : b->index * (uint32_t)w->o->lobe_samples + (uint32_t)i;
+		double u[2] = { rng_sobol(next->index, 0, next->seed),
+			rng_sobol(next->index, 1, next->seed) };
+		if (reciprocal)
+			lobe_sample_whole(lobe->k, axis, u, next->dir);
+		else
+			lobe_sample(lobe->k, axis, normal, u, next->dir);
+		double cos_i = v3_dot(normal, next->dir);
+		if (!(cos_i > 0))
+			continue;
+		double weight = reciprocal ? cos_i / fmax(cos_i, cos_o)
+		                           : cos_i / cos_o * norm / lobe_normaliser(lobe->k, cos_i);
+		push(w, b, next, lobe->coefficient, weight / n);
+	}
+}
+
+/* Follows one directional part of a point: `through` 0 for reflection into the side
+ * seen, 1 for light that comes from the other side. */
+static void branch_off(struct view_walker *w, const struct view_branch *b,
+                       const struct point *p, const struct view_lobe *lobe, int through)
+{
+	struct view_branch next;
+	double axis[3], normal[3], scale = 1;
+	int side = through ? !p->side : p->side, ideal = isinf(lobe->k);
+
+	if (through)
+		memcpy(axis, b->dir, sizeof axis);
+	else
+		v3_mad(b->dir, -2 * v3_dot(b->dir, p->n), p->n, axis);
+	for (int k = 0; k < 3; k++)
+		normal[k] = side == FRONT ? p->n[k] : -p->n[k];
+	leave(w->v, p, side, next.org);
+	next.passes = through && ideal && b->passes;
+	next.lobes = b->lobes;
+	next.index = b->index;
+	next.seed = rng_mix(b->seed + 1 + (uint64_t)through);
+	if (!ideal && w->o->lobe_samples > 0) {
+		sample_lobe(w, b, p, lobe, axis, normal, &next);
+		return;
+	}
+	if (!ideal && w->v->m->lobe == LOBE_RECIPROCAL)
+		scale = lobe_albedo(lobe->k, p->cosine);
+	memcpy(next.dir, axis, sizeof axis);
+	push(w, b, &next, lobe->coefficient, scale);
+}
+
+static void follow_branch(struct view_walker *w, const struct view_branch *b)
+{
+	const struct view_scene *v = w->v;
+	struct point p;
+
+	if (!see(v, b->org, b->dir, b->passes, &p, &w->rays))
+		return;
+	add_radiance(w, b, &p);
+	const struct view_side *s = &v->side[2 * p.material + (uint32_t)p.side];
+	if (!s->reflected.coefficient && !s->transmitted.coefficient)
+		return;
+	locate(v, &p);
+	if (s->reflected.coefficient)
+		branch_off(w, b, &p, &s->reflected, 0);
+	if (s->transmitted.coefficient)
+		branch_off(w, b, &p, &s->transmitted, 1);
+}
+
+void view_follow(struct view_walker *w, const double org[3], const double dir[3],
+                 uint32_t index, uint64_t seed)
+{
+	struct view_branch b;
+
+	memcpy(b.org, org, sizeof b.org);
+	memcpy(b.dir, dir, sizeof b.dir);
+	for (int i = 0; i < w->v->m->bands; i++)
+		b.weight[i] = 1;
+	b.depth = b.lobes = 0;
+	b.passes = 1;
+	b.index = index;
+	b.seed = seed;
+	follow_branch(w, &b);
+	while (w->waiting) {
+		b = w->stack[--w->waiting];
+		follow_branch(w, &b);
+	}
+}
+
+void view_first_seen(const struct view_scene *v, const double org[3], const double dir[3],
+                     struct view_first *first)
+{
+	struct point p;
+	uint64_t rays = 0;
+
+	first->element = RAY_MISS;
+	if (!see(v, org, dir, 1, &p, &rays))
+		return;
+	locate(v, &p);
+	first->element = p.element;
+	memcpy(first->point, p.x, sizeof p.x);
+	for (int k = 0; k < 3; k++)
+		first->normal[k] = p.side == FRONT ? p.n[k] : -p.n[k];
+}

@@ -1,0 +1,70 @@
+/* Following one camera ray and its specular tail. */
+#ifndef TWOPASS_VIEW_PATH_H
+#define TWOPASS_VIEW_PATH_H
+
+#include <stdint.h>
+
+#include "view.h"
+
+/* What one side of a material does with directional light that leaves it towards
+ * the eye, by reflection or by transmission. */
+struct view_lobe {
+	const double *coefficient;  /* [bands], NULL where there is none */
+	double k;
+};
+
+struct view_side {
+	double here[BANDS_MAX];     /* rho_d / pi of this side */
+	double across[BANDS_MAX];   /* tau_d / pi of the other side */
+	int emits, black;
+	struct view_lobe reflected, transmitted;
+};
+
+struct view_scene {
+	const struct model *m;
+	const struct ray_scene *rays;
+	const struct reconstruction *h;
+	struct view_side *side;     /* [2 materials] */
+	double ceiling[BANDS_MAX];  /* no radiance along an unsampled tail exceeds it */
+};
+
+/* A ray still to be followed. */
+struct view_branch {
+	double org[3], dir[3];
+	double weight[BANDS_MAX];   /* what of its radiance reaches the pixel */
+	int depth;                  /* directional events behind it */
+	int passes;                 /* goes through backs of one-sided materials */
+	int lobes;                  /* finite lobes behind it that were sampled */
+	uint32_t index;             /* low-discrepancy point and */
+	uint64_t seed;              /* scramble of its next lobe sample */
+};
+
+/* First surface seen. */
+struct view_first {
+	uint32_t element;           /* RAY_MISS where nothing */
+	double point[3], normal[3];
+};
+
+struct view_walker {
+	const struct view_scene *v;
+	const struct view_options *o;
+	struct view_branch *stack;
+	size_t waiting;
+	double diffuse[BANDS_MAX], directional[BANDS_MAX], emission[BANDS_MAX];
+	double cut[BANDS_MAX];
+	uint64_t rays;
+};
+
+/* Room for the branches that may wait at once. */
+size_t view_stack_size(const struct view_options *o);
+
+/* Follows the camera ray org, dir: adds the radiance it brings to w's parts.
+ * first may be NULL. */
+void view_follow(struct view_walker *w, const double org[3], const double dir[3],
+                 uint32_t index, uint64_t seed);
+
+/* The surface the ray meets first. */
+void view_first_seen(const struct view_scene *v, const double org[3], const double dir[3],
+                     struct view_first *first);
+
+#endif
