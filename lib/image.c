@@ -1,5 +1,6 @@
 #include "image.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -48,4 +49,31 @@ int image_channel(const struct image *im, const char *name)
 		if (strcmp(im->name[c], name) == 0)
 			return c;
 	return -1;
+}
+
+static int layer_of(const struct image *im, const char *layer, const char *letters,
+                    int channel[3])
+{
+	char name[300];
+
+	for (int i = 0; i < 3; i++) {
+		snprintf(name, sizeof name, "%s%s%c", layer ? layer : "", layer ? "." : "",
+		         letters[i]);
+		channel[i] = image_channel(im, name);
+		if (channel[i] < 0)
+			return 0;
+	}
+	return 3;
+}
+
+int image_layer(const struct image *im, const char *layer, int channel[3])
+{
+	int single;
+
+	if (layer_of(im, layer, "RGB", channel) || layer_of(im, layer, "XYZ", channel))
+		return 3;
+	single = image_channel(im, layer ? layer : "Y");
+	for (int i = 0; i < 3; i++)
+		channel[i] = single;
+	return single < 0 ? 0 : 1;
 }
