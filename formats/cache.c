@@ -1,10 +1,12 @@
 #include "cache.h"
 
 #include <fcntl.h>
+#include <jansson.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
+#include "../lib/mem.h"
 #include "digest.h"
 
 enum { ID_DIGITS = 32 };
@@ -184,6 +186,66 @@ int cache_read_info(const struct container *c, struct cache_info *i, struct err 
 		return -1;
 	}
 	return 0;
+}
+
+/* ---- names ---- */
+
+int cache_write_names(struct container_writer *w, const char *key, char *const *name,
+                      size_t n, struct err *e)
+{
+	json_t *list = json_array();
+	int failed = 0;
+
+	for (size_t i = 0; i < n && !failed; i++)
+		if (json_array_append_new(list, json_string(name[i])))
+			failed = err_set(e, "cannot write: %s: name %zu is not UTF-8 text", key, i);
+	char *text = failed ? NULL : json_dumps(list, JSON_COMPACT);
+	json_decref(list);
+	if (!failed && !text)
+		failed = err_set(e, "out of memory: names of %s", key);
+	failed = failed || container_meta(w, key, text, e);
+	free(text);
+	return failed ? -1 : 0;
+}
+
+void cache_names_free(char **name, size_t n)
+{
+	for (size_t i = 0; name && i < n; i++)
+		free(name[i]);
+	free(name);
+}
+
+static int copy_names(const struct container *c, const char *key, const json_t *list,
+                      char **name, size_t n, struct err *e)
+{
+	if (!json_is_array(list) || json_array_size(list) != n)
+		return container_refuse(c, e, "metadata %s: not a list of %zu names", key, n);
+	for (size_t i = 0; i < n; i++) {
+		const char *text = json_string_value(json_array_get(list, i));
+		if (!text)
+			return container_refuse(c, e, "metadata %s: name %zu is not a string", key,
+			                        i);
+		if (!(name[i] = strdup(text)))
+			return err_set(e, "%s: out of memory", container_path(c));
+	}
+	return 0;
+}
+
+int cache_read_names(const struct container *c, const char *key, char ***name, size_t n,
+                     struct err *e)
+{
+	const char *text = container_get_meta(c, key);
+	json_error_t je;
+	json_t *list = text ? json_loads(text, 0, &je) : NULL;
+
+	*name = mem_new(n, sizeof **name, key, e);
+	int failed = !*name || copy_names(c, key, list, *name, n, e);
+	json_decref(list);
+	if (!failed)
+		return 0;
+	cache_names_free(*name, n);
+	*name = NULL;
+	return -1;
 }
 
 int cache_up_to_date(const char *path, const char *format, const char *key)

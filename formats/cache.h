@@ -35,6 +35,14 @@ int cache_write_info(struct container_writer *w, const char *format,
                      const struct cache_info *i, struct err *e);
 int cache_read_info(const struct container *c, struct cache_info *i, struct err *e);
 
+/* Lists of names as metadata: a JSON array of strings. The reader wants exactly n
+ * of them; *name is allocated, name by name (cache_names_free). */
+int cache_write_names(struct container_writer *w, const char *key, char *const *name,
+                      size_t n, struct err *e);
+int cache_read_names(const struct container *c, const char *key, char ***name, size_t n,
+                     struct err *e);
+void cache_names_free(char **name, size_t n);
+
 /* 1 if `path` exists, is a whole container of this format (structure and header
  * digest checked) and its key is `key`: then the file is touched (mtime now). */
 int cache_up_to_date(const char *path, const char *format, const char *key);

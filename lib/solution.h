@@ -46,6 +46,10 @@ static inline double solution_irradiance(const struct solution *s, size_t elemen
 double solution_exitance(const struct model *m, const struct solution *s,
                          size_t element_side, int band);
 
+/* Sizes that fit the model, finite values, irradiances and errors >= 0. 0, or -1
+ * and e with "array NAME: what is wrong". O(element sides x bands). */
+int solution_check(const struct model *m, const struct solution *s, struct err *e);
+
 void solution_free(struct solution *s);
 
 #endif

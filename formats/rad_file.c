@@ -1,0 +1,99 @@
+#include "rad_file.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "fields.h"
+#include "mesh_file.h"
+
+#define FORMAT "twopass.rad"
+
+enum { FIELDS_MAX = 16 };
+
+/* The solution's arrays with shapes from its counts; shots is a number in the
+ * struct and an array of one in the file. */
+static size_t solution_fields(struct solution *s, uint64_t **shots,
+                              struct field out[FIELDS_MAX])
+{
+	const uint64_t b = (uint64_t)s->bands, sides = s->element_sides, g = s->groups;
+	const struct field f[] = {
+		{ &s->direct, "irradiance_direct", DT_F64, 3, { g, sides, b } },
+		{ &s->caustic, "irradiance_caustic", DT_F64, 3, { g, sides, b } },
+		{ &s->indirect, "irradiance_indirect", DT_F64, 3, { g, sides, b } },
+		{ &s->error, "irradiance_error", DT_F64, 2, { sides, b } },
+		{ &s->unshot_emission, "unshot_emission", DT_F64, 2, { s->patch_sides, b } },
+		{ &s->unshot_diffuse, "unshot_diffuse", DT_F64, 2, { s->patch_sides, b } },
+		{ &s->unshot_link, "unshot_link", DT_F64, 3, { s->links, 2, b } },
+		{ &s->ledger, "ledger", DT_F64, 2, { LEDGER_TERMS, b } },
+		{ shots, "shots", DT_U64, 1, { 1 } },
+	};
+
+	memcpy(out, f, sizeof f);
+	return sizeof f / sizeof *f;
+}
+
+static int put_solution(struct container_writer *w, const struct model *m,
+                        const struct solution *s, struct err *e)
+{
+	struct field f[FIELDS_MAX];
+	struct solution view = *s; /* the list points at pointers: those of this copy */
+	uint64_t *shots = &view.shots;
+
+	return solution_check(m, s, e) ||
+	       fields_put(w, f, solution_fields(&view, &shots, f), e) ? -1 : 0;
+}
+
+int rad_file_write(const char *path, const struct model *m, const struct solution *s,
+                   const struct cache_info *i, struct err *e)
+{
+	struct container_writer *w = container_create(path, e);
+	struct cache_info info = *i;
+	struct err why = { 0 };
+
+	if (!w)
+		return -1;
+	cache_ids(m, &info);
+	if (mesh_put_model(w, m, &why) || put_solution(w, m, s, &why) ||
+	    cache_write_info(w, FORMAT, &info, &why)) {
+		container_abandon(w);
+		return err_set(e, "%s: cannot write: %s", path, why.text);
+	}
+	return container_finish(w, e);
+}
+
+static int get_solution(const struct container *c, const struct model *m,
+                        struct solution *s, struct err *e)
+{
+	struct field f[FIELDS_MAX];
+	struct err why = { 0 };
+	uint64_t *shots = NULL;
+
+	*s = (struct solution){ .bands = m->bands, .element_sides = 2 * m->elements,
+	                        .patch_sides = 2 * m->patches };
+	if (fields_size(c, "irradiance_direct", DT_F64, 3, 0, &s->groups, e) ||
+	    fields_size(c, "unshot_link", DT_F64, 3, 0, &s->links, e) ||
+	    fields_copy(c, f, solution_fields(s, &shots, f), e)) {
+		free(shots);
+		return -1;
+	}
+	s->shots = *shots;
+	free(shots);
+	return solution_check(m, s, &why) ? container_refuse(c, e, "%s", why.text) : 0;
+}
+
+int rad_file_read(const char *path, struct model *m, struct solution *s,
+                  struct cache_info *i, struct err *e)
+{
+	struct container *c = container_open(path, FORMAT, e);
+	int failed = !c || container_verify_all(c, e) || cache_read_info(c, i, e) ||
+	             mesh_get_model(c, m, e) || mesh_check_ids(c, m, i, e) ||
+	             get_solution(c, m, s, e);
+
+	container_close(c);
+	if (!failed)
+		return 0;
+	model_free(m);
+	solution_free(s);
+	cache_info_free(i);
+	return -1;
+}

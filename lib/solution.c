@@ -1,0 +1,59 @@
+#include "solution.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+double solution_exitance(const struct model *m, const struct solution *s,
+                         size_t element_side, int band)
+{
+	const struct materials *mt = &m->material;
+	uint32_t material = model_patch_material(m, m->element_patch[element_side >> 1]);
+	int side = (int)(element_side & 1);
+	size_t here = material_at(mt, material, side) + (size_t)band;
+	size_t there = material_at(mt, material, !side) + (size_t)band;
+
+	/* A black back gives nothing back and lets nothing through. */
+	if (mt->one_sided[material])
+		return side == BACK ? 0 :
+		       mt->rho_d[here] * solution_irradiance(s, element_side, band);
+	return mt->rho_d[here] * solution_irradiance(s, element_side, band) +
+	       mt->tau_d[there] * solution_irradiance(s, element_side ^ 1, band);
+}
+
+static int check_numbers(const char *name, const double *v, size_t n, int signs,
+                         struct err *e)
+{
+	for (size_t i = 0; i < n; i++)
+		if (!isfinite(v[i]) || (v[i] < 0 && !signs))
+			return err_set(e, "array %s: value %zu is %g", name, i, v[i]);
+	return 0;
+}
+
+int solution_check(const struct model *m, const struct solution *s, struct err *e)
+{
+	size_t bands = (size_t)s->bands, sides = s->element_sides * bands;
+
+	if (s->bands != m->bands || s->element_sides != 2 * m->elements ||
+	    s->patch_sides != 2 * m->patches || s->groups < 1)
+		return err_set(e, "array irradiance_direct: it is not that of the model's elements");
+	return check_numbers("irradiance_direct", s->direct, s->groups * sides, 0, e) ||
+	       check_numbers("irradiance_caustic", s->caustic, s->groups * sides, 0, e) ||
+	       check_numbers("irradiance_indirect", s->indirect, s->groups * sides, 0, e) ||
+	       check_numbers("irradiance_error", s->error, sides, 0, e) ||
+	       check_numbers("unshot_emission", s->unshot_emission, s->patch_sides * bands, 1,
+	                     e) ||
+	       check_numbers("unshot_diffuse", s->unshot_diffuse, s->patch_sides * bands, 1,
+	                     e) ||
+	       check_numbers("unshot_link", s->unshot_link, 2 * s->links * bands, 1, e) ||
+	       check_numbers("ledger", s->ledger, LEDGER_TERMS * bands, 1, e) ? -1 : 0;
+}
+
+void solution_free(struct solution *s)
+{
+	double *array[] = { s->direct, s->caustic, s->indirect, s->error, s->unshot_emission,
+		s->unshot_diffuse, s->unshot_link, s->ledger };
+
+	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
+		free(array[i]);
+	*s = (struct solution){ 0 };
+}
