@@ -291,8 +291,8 @@ def two_pass():
     edge = [(low[0] - rim, low[1] - rim), (high[0] + rim, high[1] + rim)]
     outline = [(edge[0][0], edge[0][1], deep), (edge[1][0], edge[0][1], deep),
                (edge[1][0], edge[1][1], deep), (edge[0][0], edge[1][1], deep)]
-    s.shape("mirror", Shape().polygon(*face), mirror)
-    s.shape("mirror frame", frame_of(outline, face).join(
+    s.shape("wall mirror", Shape().polygon(*face), mirror)
+    s.shape("wall mirror frame", frame_of(outline, face).join(
         Shape().box((*edge[0], 0), (*edge[1], deep), skip="zZ")), wood)
 
     # Two panes on a low plinth, with things to see behind them.

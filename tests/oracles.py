@@ -1,0 +1,337 @@
+#!/usr/bin/python3
+"""Compares the chain with the exact answers of tests/data/global_illumination.json.
+
+oracles.py --named    the eight scenes to start with, both methods, as TAP
+oracles.py --all      every scene, both methods, as a table
+oracles.py ID...      these scenes, as a table
+    --method M        only hemicube, rays or reference (irradiance by particles)
+    --reference       with --all or ID...: `reference --irradiance` instead of the chain
+
+What counts as agreement (every value, no exceptions):
+  hemicube   |got - expected| <= rel_tol_hemicube |expected|
+  others     |got - expected| <= rel_tol |expected| + z SE
+z is the two-sided 99 % point for the whole family of values compared by this run
+(Bonferroni; each element of an every_point expectation is a value). SE is the
+standard error the tools themselves state for each element. For a mean or a
+fitted point value the elements' errors are combined as if they were independent.
+A point value is the local quadratic whose element means fit the computed ones
+best. E/pi is rounded in the scene, hence the floor of 4e-15 under every relative
+tolerance; an expected 0 must be exactly 0."""
+import argparse
+import fnmatch
+import json
+import math
+import os
+import statistics
+import sys
+import tempfile
+import time
+
+import numpy as np
+
+sys.dont_write_bytecode = True
+from chain import Failed, Tap, container, picture, run, table
+from oracle2gltf import INSIDE, convert, oracles, unsupported
+
+# One line a group: patch and element size as fractions of the longest face edge,
+# samples of each method, where shooting stops.
+GROUPS = {
+    #           patch  element  hemicube              rays              shoot
+    "furnace":  (1/4,  1/4,  ["-n", "128"], ["-n", "4096"], ["-e", "1e-12"]),
+    "network":  (1/12, 1/24, ["-n", "128"], ["-n", "16384"], ["-e", "1e-8"]),
+    "cie":      (1/12, 1/24, ["-n", "128"], ["-n", "16384"], ["-e", "1e-8"]),
+    "specular": (1/12, 1/12, ["-n", "128"], ["-n", "16384"], ["-e", "1e-8"]),
+}
+PARTICLES = ["--samples", "4000000"]
+VIEW = ["-s", "64x64", "--samples", "1", "--compression", "none"]
+
+NAMED = ["furnace_hetero_diffuse", "furnace_partition_diffuse",
+         "infinite_plates_directional_partition_n1", "infinite_plates_directional_partition_n10",
+         "infinite_plates_directional_partition_ninf", "mirror_virtual_image_rs1.0",
+         "open_lobe_normaliser", "box_in_box_isolated"]
+
+
+class Value:
+    """One number to judge. `count` numbers of an every_point expectation are judged
+    together: worst() picks the one that is furthest outside."""
+
+    def __init__(self, scene, method, expect, got, error, what):
+        self.scene, self.method, self.what = scene, method, what
+        self.expected = expect["value"]
+        self.got = np.atleast_1d(np.asarray(got, float))
+        self.error = np.broadcast_to(np.atleast_1d(np.asarray(error, float)), self.got.shape)
+        hemicube = method == "hemicube"
+        self.tol = max(expect["rel_tol_hemicube" if hemicube else "rel_tol"], 4e-15) \
+            if self.expected else 0.0
+        self.sampled = not hemicube
+
+    def count(self):
+        return len(self.got)
+
+    def worst(self, z):
+        """Deviation, tolerance and index of the value worst off."""
+        allowed = self.tol * abs(self.expected) + self.sampled * z * self.error
+        off = np.abs(self.got - self.expected)
+        off[~np.isfinite(off)] = np.inf
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(off == 0, 0, off / allowed)
+        i = int(np.argmax(ratio))
+        return i, allowed[i], bool(off[i] <= allowed[i])
+
+
+class Note:
+    """A scene that did not get as far as values."""
+
+    def __init__(self, scene, method, text, failed):
+        self.scene, self.method, self.text, self.failed = scene, method, text, failed
+
+
+class Field:
+    """What a run computed on every modelled element-side: rows of a CSV and the
+    standard error of H, and the corners of the elements."""
+
+    def __init__(self, rows, error, corners):
+        self.name = [r["name"] for r in rows]
+        self.side = np.array([side_of(r) for r in rows])
+        self.element = np.array([int(r["element"]) for r in rows])
+        self.area = np.array([r["area"] for r in rows])
+        self.h = np.array([r["H_0"] for r in rows])
+        self.b = np.array([r.get("M_0", math.nan) + r.get("E_0", math.nan) for r in rows])
+        self.error = error
+        self.corners = corners
+
+    def of(self, quantity):
+        return {"H": self.h, "B": self.b}[quantity]
+
+    def faces(self, pattern, side):
+        wanted = {"front": 0, "back": 1}[side]
+        return np.array([i for i, n in enumerate(self.name)
+                         if self.side[i] == wanted and fnmatch.fnmatchcase(n, pattern)], int)
+
+
+def side_of(row):
+    s = row["side"]
+    return {"front": 0, "back": 1, "f": 0, "b": 1, "0": 0, "1": 1}[s]
+
+
+def fitted_weights(corners, point):
+    """Weights of the nearest elements' means in the quadratic through them at a
+    point of their plane. corners: [n][3][3]; returns indices and weights."""
+    point = np.asarray(point, float)
+    distance = np.linalg.norm(corners.mean(1) - point, axis=1)
+    near = np.argsort(distance, kind="stable")[:24]
+    tri = corners[near]
+    u = tri[0, 1] - tri[0, 0]
+    u /= np.linalg.norm(u)
+    n = np.cross(u, tri[0, 2] - tri[0, 0])
+    v = np.cross(n / np.linalg.norm(n), u)
+    x, y = (tri - point) @ u, (tri - point) @ v
+    size = max(np.abs(x).max(), np.abs(y).max())
+    x, y = x / size, y / size
+    mean = lambda a, b: (a.sum(1) * b.sum(1) + (a * b).sum(1)) / 12
+    basis = np.stack([np.ones(len(near)), x.mean(1), y.mean(1), mean(x, x), mean(x, y), mean(y, y)], 1)
+    return near, np.linalg.pinv(basis)[0]
+
+
+def error_of_b(field, rows, oracle):
+    """SE of B = E + rho H(this side) + tau(other) H(other side)."""
+    at = {(field.element[i], field.side[i]): i for i in range(len(field.name))}
+    mats = {f["name"]: oracle["materials"][f["mat"]] for f in oracle["faces"]}
+    out = []
+    for i in rows:
+        sides = ["front", "back"][::1 if field.side[i] == 0 else -1]
+        m = mats[field.name[i]]
+        other = at.get((field.element[i], 1 - field.side[i]))
+        transmitted = m[sides[1]]["tau_d"] * field.error[other] if other is not None else 0.0
+        out.append(math.hypot(m[sides[0]]["rho_d"] * field.error[i], transmitted))
+    return np.array(out)
+
+
+def surface_value(oracle, method, e, field):
+    """The Value of an expectation on H or B."""
+    rows = field.faces(e["face"], e["side"])
+    what = f"{e['stat']} {e['quantity']} {e['face']} {e['side']}"
+    if not len(rows):
+        return Value(oracle["id"], method, e, math.nan, 0, what + " (no such face)")
+    got = field.of(e["quantity"])[rows]
+    error = field.error[rows] if e["quantity"] == "H" else error_of_b(field, rows, oracle)
+    if e["stat"] == "mean":
+        w = field.area[rows] / field.area[rows].sum()
+    elif e["stat"] == "point":
+        near, weights = fitted_weights(field.corners[rows], e["point"])
+        got, error, w = got[near], error[near], weights
+        what += " " + e.get("label", ",".join(f"{c:g}" for c in e["point"]))
+    else:
+        return Value(oracle["id"], method, e, got, error, what)
+    return Value(oracle["id"], method, e, w @ got, math.sqrt(((w * error) ** 2).sum()), what)
+
+
+def reflected_fraction(oracle, method, e, field):
+    """Flux on the receiver over flux reflected by the lobe; the receiver sees no
+    emitter directly."""
+    mirror, receiver = field.faces("mirror", "front"), field.faces(e["face"], "front")
+    rho = oracle["materials"]["m"]["front"]["rho_s"]
+    flux = lambda rows: (field.h[rows] * field.area[rows]).sum()
+    spread = lambda rows: math.sqrt(((field.error[rows] * field.area[rows]) ** 2).sum())
+    sent, got = rho * flux(mirror), flux(receiver)
+    ratio = got / sent if sent else math.nan
+    error = math.hypot(spread(receiver), ratio * rho * spread(mirror)) / sent if sent else math.nan
+    return Value(oracle["id"], method, e, ratio, error, "flux fraction receiver")
+
+
+def escaped(oracle, method, e, field, ledger):
+    """Escaped flux: from the solver's ledger; its error from what the faces absorb."""
+    if ledger is None:
+        return Note(oracle["id"], method, "escaped_flux: particles do not state it", False)
+    absorbed = [field.area[i] * field.error[i] for i in range(len(field.name))]
+    return Value(oracle["id"], method, e, ledger["escaped"][0],
+                 math.sqrt(sum(a * a for a in absorbed)), "escaped flux")
+
+
+def pixels(oracle, method, e, rad, folder):
+    """All pixels of all cameras."""
+    for view, *_ in INSIDE:
+        path = os.path.join(folder, view + ".exr")
+        run("trace", rad, "-c", view, "-o", path, *VIEW)
+        planes = picture(path)
+        got = np.concatenate([planes[c].ravel() for c in "RGB"])
+        yield Value(oracle["id"], method, e, got, 0, f"every pixel of camera {view}")
+
+
+def chain_field(rad):
+    meta, arrays = container(rad)
+    rows = table(run("inspect", rad, "--csv").stdout)
+    sides = np.array([2 * int(r["element"]) + side_of(r) for r in rows])
+    error = arrays["irradiance_error"][sides, 0]
+    corners = arrays["vertex"][arrays["element"][sides // 2].astype(int)]
+    return Field(rows, error, corners), ledger_of(arrays)
+
+
+def ledger_of(arrays):
+    terms = ("emitted", "absorbed", "escaped", "lost", "cut")
+    return dict(zip(terms, arrays["ledger"]))
+
+
+def particle_field(mesh):
+    meta, arrays = container(mesh)
+    rows = table(run("reference", mesh, "--irradiance", *PARTICLES).stdout)
+    error = np.array([r["SE_0"] for r in rows])
+    elements = np.array([int(r["element"]) for r in rows])
+    return Field(rows, error, arrays["vertex"][arrays["element"][elements].astype(int)]), None
+
+
+def values_of(oracle, method, field, ledger, rad, folder):
+    for e in oracle["expect"]:
+        if e["quantity"] in ("H", "B"):
+            if e["quantity"] == "B" and np.isnan(field.b).all():
+                continue
+            yield surface_value(oracle, method, e, field)
+        elif e["quantity"] == "escaped_flux":
+            yield escaped(oracle, method, e, field, ledger)
+        elif e["quantity"] == "fraction_of_mirror_reflected_flux":
+            yield reflected_fraction(oracle, method, e, field)
+        elif e["quantity"] == "pixel_radiance" and rad:
+            yield from pixels(oracle, method, e, rad, folder)
+
+
+def evaluate(oracle, method, folder):
+    """Runs one scene by one method: a list of Values and Notes."""
+    reason = unsupported(oracle)
+    if reason:
+        return [Note(oracle["id"], method, reason, False)]
+    patch, element, cube, rays, stop = GROUPS[oracle["group"]]
+    longest = max(np.linalg.norm(np.subtract(f["verts"][0], f["verts"][i]))
+                  for f in oracle["faces"] for i in (1, -1))
+    path = lambda suffix: os.path.join(folder, oracle["id"] + suffix)
+    try:
+        convert(oracle, path(".gltf"))
+        run("mesh", path(".gltf"), "-o", path(".mesh"), "-p", patch * longest, "-e", element * longest)
+        if method == "reference":
+            field, ledger = particle_field(path(".mesh"))
+            return list(values_of(oracle, method, field, ledger, None, folder))
+        run("ffcalc", path(".mesh"), "-o", path(".ff"), "-m", method,
+            *(cube if method == "hemicube" else rays))
+        run("shoot", path(".mesh"), path(".ff"), "-o", path(".rad"), *stop)
+        field, ledger = chain_field(path(".rad"))
+        return list(values_of(oracle, method, field, ledger, path(".rad"), folder))
+    except Failed as problem:
+        return [Note(oracle["id"], method, str(problem), True)]
+
+
+def evaluate_all(ids, methods):
+    known, results = oracles(), []
+    for i, name in enumerate(ids):
+        for method in methods:
+            begun = time.time()
+            with tempfile.TemporaryDirectory() as folder:
+                results += evaluate(known[name], method, folder)
+            if sys.stderr.isatty() or os.environ.get("VERBOSE"):
+                print(f"oracles: {i + 1}/{len(ids)} {name} {method} {time.time() - begun:.1f} s",
+                      file=sys.stderr)
+    return results
+
+
+def family_z(results):
+    """The normal quantile that all values together exceed with probability .01."""
+    family = sum(r.count() for r in results if isinstance(r, Value) and r.sampled)
+    return statistics.NormalDist().inv_cdf(1 - .01 / (2 * max(family, 1))), family
+
+
+HEAD = ("scene", "method", "quantity", "expected", "got", "deviation", "tolerance", "std error", "")
+
+
+def print_table(results):
+    z, family = family_z(results)
+    rows = [HEAD]
+    for r in results:
+        if isinstance(r, Note):
+            rows.append((r.scene, r.method, r.text, "", "", "", "", "",
+                         "FAIL" if r.failed else "not run"))
+            continue
+        i, allowed, good = r.worst(z)
+        rows.append((r.scene, r.method, r.what, f"{r.expected:.7g}", f"{r.got[i]:.7g}",
+                     f"{r.got[i] - r.expected:+.1e}", f"{allowed:.1e}",
+                     f"{r.error[i]:.1e}" if r.sampled else "", "ok" if good else "FAIL"))
+    wide = [max(len(row[c]) for row in rows if row[8] not in ("FAIL", "not run") or c != 2 or row[3])
+            for c in range(len(HEAD))]
+    for row in rows:
+        print("  ".join(cell.ljust(w) for cell, w in zip(row, wide)).rstrip())
+    bad = sum(row[8] == "FAIL" for row in rows)
+    print(f"\n{len(rows) - 1} lines, {bad} FAIL; z = {z:.2f} for 99 % over {family} sampled values; "
+          "errors of means and points combined as if independent between elements")
+    return bad
+
+
+def print_tap(results):
+    z, _ = family_z(results)
+    tap = Tap()
+    for r in results:
+        name = f"{r.scene}, {r.method}: "
+        if isinstance(r, Note):
+            (tap.ok(False, name + r.text) if r.failed else tap.skip(name, r.text))
+            continue
+        i, allowed, good = r.worst(z)
+        tap.ok(good, name + r.what, f"expected {r.expected:.9g}, got {r.got[i]:.9g}, "
+               f"tolerance {allowed:.2g}, standard error {r.error[i]:.2g}")
+    return tap.finish()
+
+
+def main():
+    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    p.add_argument("--named", action="store_true")
+    p.add_argument("--all", action="store_true")
+    p.add_argument("--reference", action="store_true")
+    p.add_argument("--method", choices=["hemicube", "rays", "reference"])
+    p.add_argument("ids", nargs="*")
+    a = p.parse_args()
+    methods = ["reference"] if a.reference else [a.method] if a.method else ["hemicube", "rays"]
+    known = oracles()
+    unknown = [i for i in a.ids if i not in known]
+    if unknown or not (a.named or a.all or a.ids):
+        p.error(f"no scene {unknown[0]}" if unknown else "--named, --all or scenes are needed")
+    results = evaluate_all(NAMED if a.named else list(known) if a.all else a.ids, methods)
+    sys.exit(print_tap(results) if a.named else 1 if print_table(results) else 0)
+
+
+if __name__ == "__main__":
+    main()
