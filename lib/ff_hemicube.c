@@ -90,6 +90,7 @@ static void capture_pixel(struct ff_thread *t, uint32_t i, const struct view *v,
 	if (!t->capturing)
 		return;
 	t->now = (struct capture){ .element = v->element, .view = i };
+	t->capture_weight = 1 / w;
 	memcpy(t->now.x, v->eye, sizeof t->now.x);
 	memcpy(t->now.l, dir, sizeof t->now.l);
 	uint32_t ps = item == HEMI_VOID ? 0 : 2 * t->job->m->element_patch[item >> 1] + (item & 1);

@@ -49,6 +49,7 @@ struct ff_thread {
 	struct rng rng;
 	struct vec captures;      /* struct capture */
 	int capturing;
+	double capture_weight;    /* of a capture, per weight of the ray */
 	struct capture now;       /* the sample being followed, while capturing */
 	struct hemicube cube;
 	uint32_t *item;           /* hemicube: [points][2 sides][pixels] of the patch */

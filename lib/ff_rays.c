@@ -20,7 +20,7 @@ static void capture(struct ff_thread *t, uint32_t source, uint32_t chain, double
 		return;
 	c.source = source;
 	c.chain = chains_reverse(&t->tally.chains, chain, &t->tally.err);
-	c.w = w;
+	c.w = w * t->capture_weight;
 	if (c.chain != CHAIN_NONE)
 		vec_append(&t->captures, &c, 1, sizeof c, &t->tally.err);
 }
@@ -206,6 +206,7 @@ static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struc
 	t->captures.n = 0;
 	if (j->shoots_diffuse[ps] || j->has_lobe[ps]) {
 		t->capturing = j->has_lobe[ps];
+		t->capture_weight = 1;
 		cast(t, ps, rays, -1);
 		t->capturing = 0;
 		struct ff_batch unused = { 0 };

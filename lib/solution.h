@@ -18,16 +18,21 @@ struct solution {
 	double *error;             /* [2E][bands] standard error of their sum from
 	                              the form factors' sampling */
 
-	/* What is still to be shot (for shoot --resume) and where the rest went. */
+	/* The solver's state, for shoot --resume: what is still to be shot, what each
+	 * row has sent so far, where the rest went. */
 	size_t patch_sides;        /* 2 P */
-	size_t links;              /* of all shards, in order */
+	size_t links;              /* of all shards, in the solver's order */
+	size_t rows;               /* of all shards, in order */
 	double *unshot_emission;   /* [2P][bands] flux not yet sent by emitters */
 	double *unshot_diffuse;    /* [2P][bands] flux to leave diffusely */
-	double *unshot_link;       /* [links][2][bands] flux arrived at a link's target,
-	                              first what has met only emitters, directional and
-	                              ideal events so far, then the rest */
+	double *unshot_link;       /* [links][2][bands] flux to leave by the lobes of a
+	                              link's target: first what has met only emitters,
+	                              directional and ideal events so far, then the rest */
+	double *shot;              /* [rows][2][bands] flux sent, split likewise */
 	double *ledger;            /* [LEDGER_TERMS][bands] flux */
 	uint64_t shots;
+	double round[2];           /* the priority that the current round of shots asks
+	                              for, and the next patch-side in it */
 };
 
 enum { LEDGER_EMITTED, LEDGER_ABSORBED, LEDGER_ESCAPED, LEDGER_LOST, LEDGER_CUT,

@@ -1,0 +1,354 @@
+#include "transport.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "bsdf.h"
+#include "par.h"
+
+/* ---- shards ---- */
+
+static int check_parts(const struct ff **f, const char *const *names, size_t n, struct err *e)
+{
+	for (size_t i = 0; i < n; i++) {
+		if (f[i]->parts != f[0]->parts)
+			return err_set(e, "%s: part %u of %u, but %s is one of %u; give all parts of "
+			               "one run of ffcalc", names[i], f[i]->part, f[i]->parts,
+			               names[0], f[0]->parts);
+		for (size_t k = 0; k < i; k++)
+			if (f[k]->part == f[i]->part)
+				return err_set(e, "%s: overlaps %s, both are part %u of %u",
+				               names[i], names[k], f[i]->part, f[i]->parts);
+	}
+	for (uint32_t part = 1; part <= f[0]->parts; part++) {
+		size_t i = 0;
+		while (i < n && f[i]->part != part)
+			i++;
+		if (i == n)
+			return err_set(e, "%s: part %u of %u is missing; run ffcalc --part %u/%u",
+			               names[0], part, f[0]->parts, part, f[0]->parts);
+	}
+	return 0;
+}
+
+static int by_part(const void *a, const void *b)
+{
+	const struct ff *x = *(const struct ff *const *)a, *y = *(const struct ff *const *)b;
+	return (x->part > y->part) - (x->part < y->part);
+}
+
+/* ---- chains: shard numbers -> common numbers ---- */
+
+static uint32_t *common_chains(struct transport *t, const struct ff *f, struct err *e)
+{
+	uint32_t *map = mem_new(f->chains, sizeof *map, "chains", e);
+	uint32_t *count = mem_new(t->chains.events, sizeof *count, "chains", e);
+	int bad = !map || !count;
+
+	for (size_t c = 0; !bad && c < f->chains; c++) {
+		memset(count, 0, t->chains.events * sizeof *count);
+		for (uint64_t i = f->chain_start[c]; !bad && i < f->chain_start[c + 1]; i++) {
+			uint32_t id = f->chain_event[i];
+			if (id >= 4 * t->m->material.n || t->chains.slot[id] == CHAIN_NONE)
+				bad = err_set(e, "form factors pass an ideal surface that the model "
+				              "does not have; run ffcalc again");
+			else
+				count[t->chains.slot[id]] = f->chain_count[i];
+		}
+		bad = bad || (map[c] = chains_find(&t->chains, count, e)) == CHAIN_NONE;
+	}
+	free(count);
+	if (!bad)
+		return map;
+	free(map);
+	return NULL;
+}
+
+/* ---- rows and blocks ---- */
+
+static int size_arrays(struct transport *t, struct err *e)
+{
+	size_t sides = 2 * t->m->patches;
+
+	for (size_t i = 0; i < t->shards; i++) {
+		t->rows += t->shard[i]->rows;
+		t->blocks += t->shard[i]->blocks;
+		t->links += t->shard[i]->links;
+		t->entries += t->shard[i]->entries;
+	}
+	t->row_side = mem_new(t->rows, sizeof *t->row_side, "rows", e);
+	t->row_kind = mem_new(t->rows, 1, "rows", e);
+	t->row_samples = mem_new(t->rows, sizeof *t->row_samples, "rows", e);
+	t->row_block = mem_new(t->rows + 1, sizeof *t->row_block, "rows", e);
+	t->diffuse_row = mem_new(sides, sizeof *t->diffuse_row, "rows", e);
+	t->emission_row = mem_new(sides, sizeof *t->emission_row, "rows", e);
+	t->block = mem_new(t->blocks + 1, sizeof *t->block, "blocks", e);
+	t->link_target = mem_new(t->links, sizeof *t->link_target, "links", e);
+	t->link_row = mem_new(t->links, 2 * sizeof *t->link_row, "links", e);
+	t->target_link = mem_new(sides + 1, sizeof *t->target_link, "links", e);
+	if (!t->row_side || !t->row_kind || !t->row_samples || !t->row_block ||
+	    !t->diffuse_row || !t->emission_row || !t->block || !t->link_target ||
+	    !t->link_row || !t->target_link)
+		return -1;
+	memset(t->diffuse_row, 0xff, sides * sizeof *t->diffuse_row);
+	memset(t->emission_row, 0xff, sides * sizeof *t->emission_row);
+	return 0;
+}
+
+/* Copies a shard's rows and block heads behind `row` rows and `block` blocks. */
+static void put_rows(struct transport *t, uint32_t shard, const uint32_t *chain, size_t row,
+                     size_t block)
+{
+	const struct ff *f = t->shard[shard];
+
+	for (size_t r = 0; r < f->rows; r++) {
+		uint32_t ps = f->row_side[r];
+		t->row_side[row + r] = ps;
+		t->row_kind[row + r] = f->row_kind[r];
+		t->row_samples[row + r] = f->row_samples[r];
+		t->row_block[row + r + 1] = block + f->row_block[r + 1];
+		if (f->row_kind[r] == FF_DIFFUSE)
+			t->diffuse_row[ps] = (uint32_t)(row + r);
+		else if (f->row_kind[r] == FF_EMISSION)
+			t->emission_row[ps] = (uint32_t)(row + r);
+	}
+	for (size_t b = 0; b < f->blocks; b++)
+		t->block[block + b] = (struct block){ .chain = chain[f->block_chain[b]],
+			.shard = shard, .escape = f->block_escape[b], .black = f->block_black[b],
+			.lost = f->block_lost[b], .cut = f->block_cut[b] };
+}
+
+/* ---- links ---- */
+
+struct link_key {
+	uint32_t target, source, chain, row[2];
+	float direction[3];
+};
+
+static int by_link(const void *a, const void *b)
+{
+	const struct link_key *x = a, *y = b;
+	if (x->target != y->target)
+		return x->target < y->target ? -1 : 1;
+	if (x->source != y->source)
+		return x->source < y->source ? -1 : 1;
+	if (x->chain != y->chain)
+		return x->chain < y->chain ? -1 : 1;
+	return (x->row[0] > y->row[0]) - (x->row[0] < y->row[0]);
+}
+
+static void put_links(const struct ff *f, const uint32_t *chain, uint32_t row,
+                      struct link_key *to)
+{
+	for (size_t i = 0; i < f->links; i++) {
+		to[i] = (struct link_key){ f->link_target[i], f->link_source[i],
+		                           chain[f->link_chain[i]], { FF_NO_ROW, FF_NO_ROW }, { 0 } };
+		for (int k = 0; k < 2; k++)
+			if (f->link_row[2 * i + (size_t)k] != FF_NO_ROW)
+				to[i].row[k] = row + f->link_row[2 * i + (size_t)k];
+		memcpy(to[i].direction, &f->link_direction[3 * i], sizeof to[i].direction);
+	}
+}
+
+static void sort_links(struct transport *t, struct link_key *l)
+{
+	size_t i = 0;
+
+	if (t->links)
+		qsort(l, t->links, sizeof *l, by_link);
+	for (uint32_t ps = 0; ps < 2 * t->m->patches; ps++) {
+		t->target_link[ps] = i;
+		while (i < t->links && l[i].target == ps)
+			i++;
+	}
+	t->target_link[2 * t->m->patches] = i;
+	for (i = 0; i < t->links; i++) {
+		t->link_target[i] = l[i].target;
+		memcpy(&t->link_row[2 * i], l[i].row, sizeof l[i].row);
+	}
+}
+
+/* The link for light of a source and chain, or the one that looks nearest to where
+ * the light comes from. */
+static uint32_t find_link(const struct transport *t, const struct link_key *l, uint32_t target,
+                          uint32_t source, uint32_t chain, const float *from, uint32_t *guessed)
+{
+	size_t lo = t->target_link[target], hi = t->target_link[target + 1], end = hi;
+	struct link_key want = { .target = target, .source = source, .chain = chain };
+	float best = -2;
+
+	for (size_t n = lo; n < hi;) {
+		size_t mid = n + (hi - n) / 2;
+		if (by_link(&l[mid], &want) < 0)
+			n = mid + 1;
+		else
+			hi = mid;
+	}
+	*guessed = !(hi < end && l[hi].source == source && l[hi].chain == chain);
+	if (!*guessed)
+		return (uint32_t)hi;
+	size_t found = lo;
+	for (size_t i = lo; i < end; i++) {
+		const float *d = l[i].direction;
+		float c = from ? d[0] * from[0] + d[1] * from[1] + d[2] * from[2] : 0;
+		if (c > best) {
+			best = c;
+			found = i;
+		}
+	}
+	return found < end ? (uint32_t)found : FF_NO_ROW;
+}
+
+/* ---- runs ---- */
+
+static uint32_t entry_target(const struct transport *t, const struct ff *f, uint64_t i)
+{
+	return 2 * t->m->element_patch[f->column[i] >> 1] + (f->column[i] & 1);
+}
+
+static uint64_t run_end(const struct transport *t, const struct ff *f, uint64_t i, uint64_t end)
+{
+	uint32_t target = entry_target(t, f, i);
+
+	while (i < end && entry_target(t, f, i) == target)
+		i++;
+	return i;
+}
+
+struct pass {
+	struct transport *t;
+	const struct link_key *link;
+	const size_t *first_row, *first_block; /* by shard */
+	const uint8_t *has_lobe;
+	int fill;                              /* 0: count runs, 1: write them */
+};
+
+static const float *arrival(const struct ff *f, size_t block, uint32_t target)
+{
+	for (uint64_t i = f->block_arrival[block]; i < f->block_arrival[block + 1]; i++)
+		if (f->arrival_target[i] == target)
+			return &f->arrival_direction[3 * i];
+	return NULL;
+}
+
+static void fill_block(const struct pass *p, const struct ff *f, size_t local, size_t b,
+                       uint32_t source)
+{
+	struct transport *t = p->t;
+	struct block *block = &t->block[b];
+	uint64_t end = f->block_start[local + 1], run = block->run;
+
+	for (uint64_t i = f->block_start[local], next; i < end; i = next, run++) {
+		struct run *r = &t->run[run];
+		next = run_end(t, f, i, end);
+		*r = (struct run){ entry_target(t, f, i), (uint32_t)(next - i), FF_NO_ROW, 0, i, 0 };
+		for (uint64_t k = i; k < next; k++)
+			r->sum += ff_value(f, k);
+		block->sum += r->sum;
+		if (p->has_lobe[r->target])
+			r->link = find_link(t, p->link, r->target, source, block->chain,
+			                    arrival(f, local, r->target), &r->guessed);
+	}
+	block->sum += block->escape + block->black + block->lost + block->cut;
+}
+
+static void do_rows(void *arg, size_t begin, size_t end, int thread)
+{
+	const struct pass *p = arg;
+	struct transport *t = p->t;
+
+	(void)thread;
+	for (size_t r = begin; r < end; r++)
+		for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++) {
+			uint32_t shard = t->block[b].shard;
+			const struct ff *f = t->shard[shard];
+			size_t local = b - p->first_block[shard];
+			if (p->fill) {
+				fill_block(p, f, local, b, t->row_side[r]);
+				continue;
+			}
+			for (uint64_t i = f->block_start[local]; i < f->block_start[local + 1];) {
+				i = run_end(t, f, i, f->block_start[local + 1]);
+				t->block[b].run++; /* a count until the sums are taken */
+			}
+		}
+}
+
+static int make_runs(struct pass *p, int threads, struct err *e)
+{
+	struct transport *t = p->t;
+	uint64_t at = 0;
+
+	par_for(t->rows, 64, threads, do_rows, p, NULL);
+	for (size_t b = 0; b <= t->blocks; b++) {
+		uint64_t n = t->block[b].run;
+		t->block[b].run = at;
+		at += n;
+	}
+	t->runs = at;
+	if (!(t->run = mem_new(at, sizeof *t->run, "form factors by patch", e)))
+		return -1;
+	p->fill = 1;
+	par_for(t->rows, 64, threads, do_rows, p, NULL);
+	return 0;
+}
+
+static int join(struct transport *t, int threads, struct err *e)
+{
+	size_t row = 0, block = 0, link = 0;
+	struct link_key *l = mem_new(t->links, sizeof *l, "links", e);
+	size_t *first = mem_new(t->shards, 2 * sizeof *first, "shards", e);
+	uint8_t *has_lobe = mem_new(2 * t->m->patches, 1, "patch flags", e);
+	struct pass p = { .t = t, .link = l, .has_lobe = has_lobe };
+	int bad = !l || !first || !has_lobe;
+
+	for (uint32_t i = 0; !bad && i < t->shards; i++) {
+		uint32_t *chain = common_chains(t, t->shard[i], e);
+		if ((bad = !chain))
+			break;
+		first[i] = row;
+		first[t->shards + i] = block;
+		put_rows(t, i, chain, row, block);
+		put_links(t->shard[i], chain, (uint32_t)row, l + link);
+		row += t->shard[i]->rows;
+		block += t->shard[i]->blocks;
+		link += t->shard[i]->links;
+		free(chain);
+	}
+	if (!bad) {
+		sort_links(t, l);
+		p.first_row = first;
+		p.first_block = first + t->shards;
+		for (uint32_t ps = 0; ps < 2 * t->m->patches; ps++)
+			has_lobe[ps] = t->target_link[ps + 1] > t->target_link[ps];
+		bad = make_runs(&p, threads, e);
+	}
+	free(l);
+	free(first);
+	free(has_lobe);
+	return bad ? -1 : 0;
+}
+
+int transport_init(struct transport *t, const struct model *m, const struct ff **f,
+                   const char *const *names, size_t n, int threads, struct err *e)
+{
+	*t = (struct transport){ .m = m, .shard = f, .shards = n };
+	if (check_parts(f, names, n, e))
+		return -1;
+	qsort(f, n, sizeof *f, by_part);
+	if (chains_init(&t->chains, m, e) || size_arrays(t, e))
+		return -1;
+	return join(t, threads, e);
+}
+
+void transport_free(struct transport *t)
+{
+	void *array[] = { t->row_side, t->row_kind, t->row_samples, t->row_block,
+		t->diffuse_row, t->emission_row, t->block, t->run, t->link_target, t->link_row,
+		t->target_link };
+
+	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
+		free(array[i]);
+	chains_free(&t->chains);
+	*t = (struct transport){ 0 };
+}
