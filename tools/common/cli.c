@@ -13,14 +13,11 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "../../formats/atomic_file.h"
+
 /* Letters of the common options that have no short form: beyond any table's. */
 enum { LETTER_HELP = 100000, LETTER_VERSION };
 enum { OPTIONS_MAX = 128 };
-
-/* Async-signal-safe removers of half-written output. Weak: a program that links
- * no writer has nothing to remove. */
-void container_remove_temporaries(void) __attribute__((weak));
-void atomic_file_remove_temporaries(void) __attribute__((weak));
 
 static volatile sig_atomic_t bar_on_screen;
 
@@ -399,10 +396,7 @@ double cli_peak_megabytes(void)
 
 static void tidy_and_die(int signal_number)
 {
-	if (container_remove_temporaries)
-		container_remove_temporaries();
-	if (atomic_file_remove_temporaries)
-		atomic_file_remove_temporaries();
+	atomic_file_remove_temporaries();
 	if (bar_on_screen && write(STDERR_FILENO, "\n", 1) < 0)
 		bar_on_screen = 0;
 	/* SA_RESETHAND restored the default action, which follows on return. */

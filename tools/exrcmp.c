@@ -1,0 +1,251 @@
+/* exrcmp: the difference of two OpenEXR pictures in numbers. */
+#include <getopt.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "../formats/exr_file.h"
+#include "../formats/history.h"
+#include "../lib/compare.h"
+#include "../lib/mem.h"
+#include "common/cli.h"
+
+static const struct cli_option options[] = {
+	{ 'l', "layer", "NAME", "compare the channels of layer NAME only" },
+	{ 'm', "max-rel", "X", "exit with 1 when the relative rmse is beyond X" },
+	{ 'd', "heat", "FILE", "write the picture of the differences a - b to FILE" },
+	{ 'J', "json", NULL, "print JSON" },
+	{ 0, NULL, NULL, NULL }
+};
+
+struct options {
+	const char *file[2];
+	const char *layer, *heat;
+	double max_relative; /* negative: not given */
+	int json;
+};
+
+/* Channels that both pictures have. */
+struct pairs {
+	int n;
+	int *a, *b;
+	int colours; /* 1: rgb_a and rgb_b are the layer's R, G, B */
+	int rgb_a[3], rgb_b[3];
+};
+
+struct pictures {
+	struct image im[2];
+	struct exr_file_info info[2];
+	struct pairs pairs;
+};
+
+static void parse(struct cli *c, int argc, char **argv, struct options *o)
+{
+	int letter;
+
+	o->max_relative = -1;
+	while ((letter = cli_next(c, argc, argv)) != -1) {
+		switch (letter) {
+		case 'l': o->layer = optarg; break;
+		case 'm': o->max_relative = cli_number(c, "--max-rel", optarg, 0, INFINITY); break;
+		case 'd': o->heat = optarg; break;
+		case 'J': o->json = 1; break;
+		}
+	}
+	if (argc - optind != 2)
+		cli_usage(c, "two pictures are needed");
+	o->file[0] = argv[optind];
+	o->file[1] = argv[optind + 1];
+	if (strcmp(o->file[0], "-") == 0 && strcmp(o->file[1], "-") == 0)
+		cli_usage(c, "only one picture can come from standard input");
+	if (o->heat && strcmp(o->heat, "-") == 0)
+		cli_usage(c, "--heat needs a file; standard output is for the numbers");
+}
+
+static int in_layer(const char *channel, const char *layer)
+{
+	size_t n = layer ? strlen(layer) : 0;
+
+	return !layer || (strncmp(channel, layer, n) == 0 &&
+	                  (channel[n] == '.' || channel[n] == 0));
+}
+
+static int pair_channels(const struct cli *c, const struct options *o, struct pictures *p,
+                         struct err *e)
+{
+	const struct image *a = &p->im[0], *b = &p->im[1];
+	struct pairs *pairs = &p->pairs;
+
+	pairs->a = mem_new((size_t)a->channels, sizeof *pairs->a, "channels", e);
+	pairs->b = mem_new((size_t)a->channels, sizeof *pairs->b, "channels", e);
+	if (!pairs->a || !pairs->b)
+		return -1;
+	for (int i = 0; i < a->channels; i++) {
+		int j = image_channel(b, a->name[i]);
+
+		if (!in_layer(a->name[i], o->layer))
+			continue;
+		if (j < 0) {
+			cli_note(c, "channel %s is only in %s", a->name[i], o->file[0]);
+			continue;
+		}
+		pairs->a[pairs->n] = i;
+		pairs->b[pairs->n++] = j;
+	}
+	for (int j = 0; j < b->channels; j++)
+		if (in_layer(b->name[j], o->layer) && image_channel(a, b->name[j]) < 0)
+			cli_note(c, "channel %s is only in %s", b->name[j], o->file[1]);
+	if (pairs->n == 0)
+		return err_set(e, "%s: has no channel%s%s in common with %s", o->file[0],
+		               o->layer ? " of layer " : "", o->layer ? o->layer : "", o->file[1]);
+	pairs->colours = image_layer(a, o->layer, pairs->rgb_a) == 3 &&
+	                 image_layer(b, o->layer, pairs->rgb_b) == 3;
+	return 0;
+}
+
+static int read_pictures(const struct cli *c, const struct options *o, struct pictures *p,
+                         struct err *e)
+{
+	for (int i = 0; i < 2; i++)
+		if (exr_file_read(o->file[i], &p->im[i], &p->info[i], e))
+			return -1;
+	if (p->im[0].width != p->im[1].width || p->im[0].height != p->im[1].height)
+		return err_set(e, "%s: is %d x %d pixels but %s is %d x %d; render both at one size",
+		               o->file[0], p->im[0].width, p->im[0].height, o->file[1],
+		               p->im[1].width, p->im[1].height);
+	return pair_channels(c, o, p, e);
+}
+
+static void print_header(void)
+{
+	printf("%-16s %12s %12s %12s %12s %12s %12s %12s  %-12s %9s %9s\n", "channel", "rmse",
+	       "relative", "bias", "relative", "mean a", "mean b", "max", "at", "pixels",
+	       "left out");
+}
+
+static void print_row(const char *name, const struct compare *d)
+{
+	char at[32];
+
+	snprintf(at, sizeof at, "%d,%d", d->max_x, d->max_y);
+	printf("%-16s %12.6g %12.6g %12.6g %12.6g %12.6g %12.6g %12.6g  %-12s %9zu %9zu\n", name,
+	       d->rmse, d->relative_rmse, d->bias, d->relative_bias, d->mean_a, d->mean_b, d->max,
+	       d->pixels ? at : "-", d->pixels, d->left_out);
+}
+
+static json_t *number(double x)
+{
+	return isfinite(x) ? json_real(x) : json_null();
+}
+
+static json_t *to_json(const struct compare *d)
+{
+	return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:[i,i], s:I, s:I}", "rmse",
+	                 number(d->rmse), "relative_rmse", number(d->relative_rmse), "bias",
+	                 number(d->bias), "relative_bias", number(d->relative_bias), "mean_a",
+	                 number(d->mean_a), "mean_b", number(d->mean_b), "max", number(d->max),
+	                 "max_at", d->max_x, d->max_y, "pixels", (json_int_t)d->pixels, "left_out",
+	                 (json_int_t)d->left_out);
+}
+
+/* Compares, prints, and returns what --max-rel judges in *worst: the colours
+ * where there are, else the worst channel. */
+static int compare_all(const struct options *o, const struct pictures *p,
+                       struct compare *worst, struct err *e)
+{
+	const struct image *a = &p->im[0], *b = &p->im[1];
+	json_t *channels = json_object(), *all = json_pack("{s:s, s:s, s:i, s:i}", "a", o->file[0],
+	                                                   "b", o->file[1], "width", a->width,
+	                                                   "height", a->height);
+	struct compare d;
+
+	if (!o->json)
+		print_header();
+	if (p->pairs.colours) {
+		compare_channels(a, p->pairs.rgb_a, b, p->pairs.rgb_b, 3, worst);
+		json_object_set_new(all, "rgb", to_json(worst));
+		if (!o->json)
+			print_row("RGB", worst);
+	}
+	for (int i = 0; i < p->pairs.n; i++) {
+		const char *name = a->name[p->pairs.a[i]];
+
+		compare_channels(a, &p->pairs.a[i], b, &p->pairs.b[i], 1, &d);
+		json_object_set_new(channels, name, to_json(&d));
+		if (!o->json)
+			print_row(name, &d);
+		if (!p->pairs.colours &&
+		    (i == 0 || d.pixels == 0 || d.relative_rmse > worst->relative_rmse))
+			*worst = d;
+	}
+	json_object_set_new(all, "channels", channels);
+	if (o->json && json_dumpf(all, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(17)))
+		err_set(e, "cannot write JSON");
+	if (o->json)
+		putchar('\n');
+	json_decref(all);
+	return e->set ? -1 : 0;
+}
+
+static int write_heat(const struct options *o, const struct pictures *p, int argc, char **argv,
+                      struct err *e)
+{
+	struct image heat = { 0 };
+	struct exr_file_info info = { 0 };
+	char *history = history_append(exr_file_info_get(&p->info[0], EXR_FILE_HISTORY), argc,
+	                               argv, e);
+	int status = -1;
+
+	if (history && exr_file_info_set(&info, EXR_FILE_HISTORY, history, e) == 0 &&
+	    compare_difference(&p->im[0], p->pairs.a, &p->im[1], p->pairs.b, p->pairs.n, &heat,
+	                       e) == 0)
+		status = exr_file_write(o->heat, &heat, &info, NULL, NULL, e);
+	free(history);
+	exr_file_info_free(&info);
+	image_free(&heat);
+	return status;
+}
+
+static int judge(const struct cli *c, const struct options *o, const struct compare *d)
+{
+	if (d->left_out)
+		cli_note(c, "%zu of %zu pixels are not finite in both pictures and were left out",
+		         d->left_out, d->left_out + d->pixels);
+	if (d->pixels == 0) {
+		cli_warn(c, "no pixel is finite in both pictures");
+		return 1;
+	}
+	if (o->max_relative < 0 || d->relative_rmse <= o->max_relative)
+		return 0;
+	cli_note(c, "relative rmse %g is beyond %g", d->relative_rmse, o->max_relative);
+	return 1;
+}
+
+int main(int argc, char **argv)
+{
+	struct cli c = { .program = "exrcmp", .synopsis = "[OPTION]... A.exr B.exr",
+		         .about = "Prints the difference of two OpenEXR pictures in numbers.",
+		         .options = options };
+	struct options o = { 0 };
+	struct pictures p = { 0 };
+	struct compare worst = { 0 };
+	struct err e = { 0 };
+	int status;
+
+	parse(&c, argc, argv, &o);
+	cli_signals();
+	if (read_pictures(&c, &o, &p, &e) || compare_all(&o, &p, &worst, &e) ||
+	    (o.heat && write_heat(&o, &p, argc, argv, &e)))
+		status = cli_fail(&c, &e);
+	else
+		status = judge(&c, &o, &worst);
+	for (int i = 0; i < 2; i++) {
+		image_free(&p.im[i]);
+		exr_file_info_free(&p.info[i]);
+	}
+	free(p.pairs.a);
+	free(p.pairs.b);
+	return cli_finish(&c, status);
+}
