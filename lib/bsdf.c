@@ -88,15 +88,6 @@ static int transmits(enum bsdf_event event)
 	return event == BSDF_DIFFUSE_T || event == BSDF_LOBE_T || event == BSDF_IDEAL_T;
 }
 
-/* f of a lobe with unit coefficient; cosines to the surface are absolute. Light
- * incident at theta_i has its axis at theta_i on whichever side it leaves. */
-static double lobe_f(enum lobe_kind kind, double k, double power, double cos_i, double cos_o)
-{
-	if (kind == LOBE_RECIPROCAL) /* Neumann, Neumann & Szirmay-Kalos 1999 */
-		return (k + 1) / (2 * pi) * power / fmax(cos_i, cos_o);
-	return power / (lobe_normaliser(k, cos_i) * cos_o);
-}
-
 /* Density of the way bsdf_sample draws from a lobe about an axis at this angle. */
 static double lobe_pdf(enum lobe_kind kind, double k, double power, double cos_axis)
 {
@@ -105,8 +96,21 @@ static double lobe_pdf(enum lobe_kind kind, double k, double power, double cos_a
 	return power / lobe_normaliser(k, cos_axis);
 }
 
-/* f(wi -> wo) into f[bands] and the sampling density of the unknown direction w,
- * both without deltas; returns |n.w|. */
+/* f of a lobe with unit coefficient from its density about the known direction's
+ * axis; a and b are the absolute cosines of the known and the unknown direction.
+ * Light incident at theta_i has its axis at theta_i on whichever side it leaves. */
+static double lobe_f(enum lobe_kind kind, double k, double power, double density, double a,
+                     double b, enum bsdf_transport transport)
+{
+	if (kind == LOBE_RECIPROCAL) /* Neumann, Neumann & Szirmay-Kalos 1999 */
+		return density / fmax(a, b);
+	if (transport == BSDF_FROM_LIGHT)
+		return density / b;
+	return power / (lobe_normaliser(k, b) * a);
+}
+
+/* f(wi -> wo) into f[bands] (unless NULL) and the sampling density of the unknown
+ * direction w, both without deltas; returns |n.w|. */
 static double evaluate(const struct model *m, const struct parts *p, const double n[3],
                        const double known[3], const double w[3],
                        enum bsdf_transport transport, double *f, double *pdf)
@@ -115,29 +119,28 @@ static double evaluate(const struct model *m, const struct parts *p, const doubl
 	double a = fabs(p->cosine), b = fabs(cos_w);
 	int crosses = cos_w * p->cosine < 0;
 
-	memset(f, 0, (size_t)m->bands * sizeof *f);
+	if (f)
+		memset(f, 0, (size_t)m->bands * sizeof *f);
 	*pdf = 0;
 	if (b < in_plane)
 		return 0;
 	for (int i = 0; i < p->n; i++) {
 		const struct part *part = &p->part[i];
-		double scale, density;
+		double scale = 1 / pi, density = b / pi;
 		if (isinf(part->k) || transmits(part->event) != crosses)
 			continue;
-		if (part->event == BSDF_DIFFUSE_R || part->event == BSDF_DIFFUSE_T) {
-			scale = 1 / pi;
-			density = b / pi;
-		} else { /* R.w = 2 (n.l)(n.w) - l.w; T.w = -l.w */
+		if (part->event == BSDF_LOBE_R || part->event == BSDF_LOBE_T) {
+			/* R.w = 2 (n.l)(n.w) - l.w; T.w = -l.w */
 			double power = lobe_power(part->k,
 			                          crosses ? -along : 2 * p->cosine * cos_w - along);
-			int light = transport == BSDF_FROM_LIGHT;
 			if (power == 0)
 				continue;
-			scale = lobe_f(m->lobe, part->k, power, light ? a : b, light ? b : a);
 			density = lobe_pdf(m->lobe, part->k, power, a);
+			if (f)
+				scale = lobe_f(m->lobe, part->k, power, density, a, b, transport);
 		}
 		*pdf += part->chance * density;
-		for (int c = 0; c < m->bands; c++)
+		for (int c = 0; f && c < m->bands; c++)
 			f[c] += part->coefficient[c] * scale;
 	}
 	return b;
@@ -157,10 +160,10 @@ double bsdf_pdf(const struct model *m, size_t material, const double n[3],
                 const double known[3], enum bsdf_transport transport, const double w[3])
 {
 	struct parts p;
-	double f[BANDS_MAX], pdf;
+	double pdf;
 
 	gather_parts(m, material, n, known, transport, &p);
-	evaluate(m, &p, n, known, w, transport, f, &pdf);
+	evaluate(m, &p, n, known, w, transport, NULL, &pdf);
 	return pdf;
 }
 
