@@ -114,7 +114,8 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b,
 }
 
 /* Puts a branch that carries `scale` times `coefficient` of b's weight on the
- * stack, or cuts it and books its bound. */
+ * stack, or cuts it and books its bound. One of many samples of a lobe is cut by
+ * what all of them carry. */
 static void push(struct view_walker *w, const struct view_branch *b,
                  struct view_branch *next, const double *coefficient, double scale)
 {
@@ -126,7 +127,7 @@ static void push(struct view_walker *w, const struct view_branch *b,
 		next->weight[i] = b->weight[i] * coefficient[i] * scale;
 		most = fmax(most, next->weight[i]);
 	}
-	if (next->depth <= w->o->depth && most >= w->o->cutoff && most > 0) {
+	if (next->depth <= w->o->depth && most >= w->o->cutoff * next->share && most > 0) {
 		w->stack[w->waiting++] = *next;
 		return;
 	}
@@ -154,6 +155,7 @@ static void sample_lobe(struct view_walker *w, const struct view_branch *b,
 		n = (int)fmax(1, fmin(1, most) * w->o->lobe_samples + .5);
 	}
 	next->lobes = 1;
+	next->share = b->share / n;
 	for (int i = 0; i < n; i++) {
 		next->index = b->lobes ? b->index
 		                       : b->index * (uint32_t)w->o->lobe_samples + (uint32_t)i;
@@ -190,6 +192,7 @@ static void branch_off(struct view_walker *w, const struct view_branch *b,
 	leave(w->v, p, side, next.org);
 	next.passes = through && ideal && b->passes;
 	next.lobes = b->lobes;
+	next.share = b->share;
 	next.index = b->index;
 	next.seed = rng_mix(b->seed + 1 + (uint64_t)through);
 	if (!ideal && w->o->lobe_samples > 0) {
@@ -231,6 +234,7 @@ void view_follow(struct view_walker *w, const double org[3], const double dir[3]
 		b.weight[i] = 1;
 	b.depth = b.lobes = 0;
 	b.passes = 1;
+	b.share = 1;
 	b.index = index;
 	b.seed = seed;
 	follow_branch(w, &b);

@@ -32,6 +32,7 @@ struct view_scene {
 struct view_branch {
 	double org[3], dir[3];
 	double weight[BANDS_MAX];   /* what of its radiance reaches the pixel */
+	double share;               /* one over the samples it stands among */
 	int depth;                  /* directional events behind it */
 	int passes;                 /* goes through backs of one-sided materials */
 	int lobes;                  /* finite lobes behind it that were sampled */
