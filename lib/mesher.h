@@ -1,0 +1,64 @@
+/* From the triangles of a scene to elements and patches.
+ *
+ * In: a model with materials, surfaces, vertices, triangles, triangle_surface,
+ * triangle_uv and triangle_normal (the last two may be NULL) filled.
+ * Out: the same model cleaned and with every array of lib/model.h filled.
+ * O(n log n) in the elements made. */
+#ifndef TWOPASS_MESHER_H
+#define TWOPASS_MESHER_H
+
+#include "model.h"
+
+/* A length in metres or, if relative, as a fraction of the diagonal of the
+ * scene's bounding box; INFINITY = no bound. */
+struct mesher_size {
+	double value;
+	int relative;
+};
+
+struct mesher_options {
+	struct mesher_size patch;    /* longest side of a patch */
+	struct mesher_size element;  /* longest edge of an element */
+	double normal_cone;          /* degrees: how far the elements of a grouped
+	                                patch may turn away from its mean normal */
+};
+
+/* What cleaning did to one surface. */
+struct mesher_surface {
+	uint32_t degenerate;  /* triangles without area, dropped */
+	uint32_t duplicate;   /* triangles that coincide with a kept one, dropped */
+	uint32_t welded;      /* vertices that became one with another */
+	uint32_t opposite;    /* edges whose two triangles have opposite winding */
+};
+
+struct mesher_report {
+	size_t surfaces;                 /* of the model that came in */
+	struct mesher_surface *surface;
+	struct mesher_surface total;
+	uint32_t merged;                 /* kept triangles whose black back became the
+	                                    side of the duplicate that faced that way */
+
+	double diagonal;                 /* of the scene's bounding box, m */
+	double patch_size, element_size; /* m, or INFINITY */
+	size_t planar_patches;
+	uint32_t largest_patch;          /* elements in it */
+	double area_front, area_back;    /* of the modelled sides, m^2 */
+
+	/* Pieces connected by edges, coincident edges of different surfaces taken
+	 * together. A piece is closed if each of its edges has two triangles. */
+	size_t components, closed_components;
+	size_t open_edges;               /* with one triangle */
+	size_t crowded_edges;            /* with more than two */
+
+	/* Materials that some triangle wears, and how many of them ... */
+	size_t materials;
+	size_t two_sided, emitters, lobes, ideal, transmitting;
+};
+
+/* 0, or -1 and e (m then is to be freed as it is). r must be zeroed. */
+int mesher_run(struct model *m, const struct mesher_options *o, struct mesher_report *r,
+               struct err *e);
+
+void mesher_report_free(struct mesher_report *r);
+
+#endif

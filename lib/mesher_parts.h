@@ -1,0 +1,95 @@
+/* The stages of mesher_run, in the order in which it runs them. All return 0,
+ * or -1 and an error. */
+#ifndef TWOPASS_MESHER_PARTS_H
+#define TWOPASS_MESHER_PARTS_H
+
+#include "mesher.h"
+
+/* weld.c: finds points that are one. Points of different groups never are;
+ * points of a group are when they lie within tolerance[group] of each other,
+ * unless that would collapse one of the triangles, whose corners then need
+ * bitwise equality. */
+struct weld {
+	size_t points;
+	const double *at;         /* [points][3] */
+	const uint32_t *group;    /* [points] */
+	size_t groups;
+	const double *tolerance;  /* [groups] */
+	size_t triangles;
+	const uint32_t *triangle; /* [triangles][3] */
+};
+
+/* Numbers the distinct points in order of their first member: id[points] and
+ * *count of them. O(points + triangles). */
+int weld_points(const struct weld *w, uint32_t *id, size_t *count, struct err *e);
+
+/* The distance below which points of a box are one: 1e-9 of its diagonal (far
+ * below the spacing of float32, far above the rounding of a transform) and no
+ * less than that rounding where the coordinates are large. */
+double weld_tolerance(const double lo[3], const double hi[3]);
+
+/* The box of all vertices that triangles use. */
+void scene_box(const struct model *m, double lo[3], double hi[3]);
+
+/* clean.c: drops triangles without area, makes vertices surface by surface and
+ * welds them. Vertices keep their order. */
+int clean_model(struct model *m, struct mesher_report *r, struct err *e);
+
+/* Removes the triangles with keep[t] = 0 from all triangle arrays. */
+void clean_compact(struct model *m, const uint8_t *keep);
+
+/* position[v] = number of the place of vertex v, the same for vertices of
+ * different surfaces that coincide. To be freed; NULL and e on failure. */
+uint32_t *clean_positions(const struct model *m, size_t *places, struct err *e);
+
+/* duplicates.c: drops triangles, and pairs that make up the same plane quad,
+ * which coincide with ones of lower index. */
+int drop_duplicates(struct model *m, const uint32_t *position, struct mesher_report *r,
+                    struct err *e);
+
+/* sandwich.c: gives kept triangles of one-sided materials the side that their
+ * dropped twin showed where the kept one's black back was. twin[t] = 1 +
+ * 2 (surface of the twin) + side of the twin, or 0. Called before compaction;
+ * keep[t] tells which triangles stay. */
+int merge_sandwiches(struct model *m, const uint64_t *twin, const uint8_t *keep,
+                     struct mesher_report *r, struct err *e);
+
+/* closed.c: counts pieces, open edges and opposite windings. */
+int check_closed(const struct model *m, const uint32_t *position, size_t places,
+                 struct mesher_report *r, struct err *e);
+
+/* subdivide.c: fills elements (in no useful order) and split trees so that no
+ * edge is longer than `size`. Always the longest edge of a surface is halved,
+ * together with all triangles that share it. */
+int subdivide(struct model *m, double size, struct err *e);
+
+/* regions.c: sets region[t] of input triangles: connected pieces of one surface,
+ * plane or bending by less than the cone at each edge. */
+struct region {
+	uint32_t first;     /* lowest triangle */
+	double axis[3][3];  /* its own frame; axis[2] is the mean normal */
+};
+
+int find_regions(const struct model *m, double size, double cos_cone, uint32_t *region,
+                 struct region **regions, size_t *count, struct err *e);
+
+/* patches.c: divides regions into patches: patch[element], *count of them. */
+int find_patches(const struct model *m, double size, double cos_cone, uint32_t *patch,
+                 size_t *count, struct err *e);
+
+/* order.c: renumbers patches, elements and vertices along a Morton curve over
+ * the scene's box and fills the patch arrays. */
+int order_model(struct model *m, const uint32_t *patch, size_t patches, struct err *e);
+
+/* outline.c: the loops of planar patches. Needs model_derive. */
+int outline_patches(struct model *m, size_t *planar, struct err *e);
+
+/* x rounded to 29 significant bits (Dekker's splitting), so that lengths which
+ * differ by the rounding of a rotation compare equal. */
+static inline double coarse(double x)
+{
+	double c = x * 0x1.000001p24;
+	return c - (c - x);
+}
+
+#endif

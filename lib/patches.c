@@ -1,0 +1,334 @@
+/* Patches: regions are halved in their own frame until the pieces are small and
+ * flat enough; what a cut leaves unconnected becomes separate patches. A rectangle
+ * is halved like the elements in it, so its patches are rectangles. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "edges.h"
+#include "mem.h"
+#include "mesher_parts.h"
+#include "vec3.h"
+
+/* Connected elements order[begin, end) of a region and the box, in its frame, that
+ * they stand for. The box is halved exactly; elements that straddle the cut belong
+ * to the side of their centroid and do not widen it. */
+struct piece {
+	uint32_t begin, end, region;
+	double lo[3], hi[3];
+};
+
+struct divider {
+	const struct model *m;
+	struct edges g;          /* of the elements */
+	double centre[3];        /* of the scene: differences are taken from here */
+	double *centroid;        /* [elements][3] */
+	double *area;            /* [elements][3] area vectors */
+	struct region *region;
+	uint32_t *order, *queue; /* [elements] */
+	uint32_t *label;         /* [elements] the piece being divided */
+	uint32_t *edge_label;    /* [edges] the search that has passed */
+	uint32_t labels;
+	struct vec todo;
+	double size, cos_cone;
+	struct err *e;
+};
+
+static double element_extent(const struct divider *d, uint32_t element, const double axis[3],
+                             double *low)
+{
+	double lo = INFINITY, hi = -INFINITY, x[3];
+
+	for (size_t k = 0; k < 3; k++) {
+		v3_sub(&d->m->vertex[3 * (size_t)d->m->element[3 * (size_t)element + k]],
+		       d->centre, x);
+		double at = v3_dot(x, axis);
+		lo = fmin(lo, at);
+		hi = fmax(hi, at);
+	}
+	*low = lo;
+	return hi;
+}
+
+/* Puts queue[begin, end) on the list of pieces, with its bounding box clipped to
+ * that of the piece it is part of. */
+static int push_piece(struct divider *d, uint32_t begin, uint32_t end,
+                      const struct piece *within)
+{
+	struct piece p = *within;
+
+	p.begin = begin;
+	p.end = end;
+	for (int k = 0; k < 3; k++) {
+		double lo = INFINITY, hi = -INFINITY, low;
+		for (uint32_t i = begin; i < end; i++) {
+			hi = fmax(hi, element_extent(d, d->queue[i], d->region[p.region].axis[k],
+			                             &low));
+			lo = fmin(lo, low);
+		}
+		p.lo[k] = fmax(p.lo[k], lo);
+		p.hi[k] = fmin(p.hi[k], hi);
+	}
+	return vec_append(&d->todo, &p, 1, sizeof p, d->e);
+}
+
+/* Appends to the queue the elements with the given label that element's edges
+ * lead to, and takes their label away. */
+static uint32_t spread(struct divider *d, uint32_t element, uint32_t label, uint32_t tail)
+{
+	for (size_t k = 0; k < 3; k++) {
+		uint32_t edge = d->g.of[3 * (size_t)element + k];
+		if (d->edge_label[edge] == label)
+			continue;
+		d->edge_label[edge] = label;
+		for (uint32_t u = d->g.start[edge]; u < d->g.start[edge + 1]; u++) {
+			uint32_t next = d->g.use[u] / 3;
+			if (d->label[next] != label)
+				continue;
+			d->label[next] = 0;
+			d->queue[tail++] = next;
+		}
+	}
+	return tail;
+}
+
+/* Puts the connected parts of order[begin, end) on the list of pieces. */
+static int push_connected(struct divider *d, uint32_t begin, uint32_t end,
+                          const struct piece *within)
+{
+	uint32_t label = ++d->labels, tail = begin;
+
+	for (uint32_t i = begin; i < end; i++)
+		d->label[d->order[i]] = label;
+	for (uint32_t i = begin; i < end; i++) {
+		uint32_t part = tail, head = tail;
+		if (d->label[d->order[i]] != label)
+			continue;
+		d->label[d->order[i]] = 0;
+		d->queue[tail++] = d->order[i];
+		while (head < tail)
+			tail = spread(d, d->queue[head++], label, tail);
+		if (push_piece(d, part, tail, within))
+			return -1;
+	}
+	memcpy(d->order + begin, d->queue + begin, (end - begin) * sizeof *d->order);
+	return 0;
+}
+
+/* Divides a piece at centroid . axis = at; lo and hi are the boxes' new bounds
+ * along the axis. */
+static int cut(struct divider *d, const struct piece *p, int axis, double at)
+{
+	struct piece low = *p, high = *p;
+	uint32_t n = p->begin, above = p->begin;
+
+	for (uint32_t i = p->begin; i < p->end; i++)
+		if (v3_dot(&d->centroid[3 * (size_t)d->order[i]],
+		           d->region[p->region].axis[axis]) >= at)
+			d->queue[above++] = d->order[i];
+		else
+			d->order[n++] = d->order[i];
+	memcpy(d->order + n, d->queue + p->begin, (above - p->begin) * sizeof *d->order);
+	low.hi[axis] = high.lo[axis] = at;
+	return push_connected(d, p->begin, n, &low) || push_connected(d, n, p->end, &high) ? -1 : 0;
+}
+
+/* The longest side of the box that exceeds the patch size, or -1. */
+static int too_long(const struct divider *d, const struct piece *p)
+{
+	double longest = d->size * (1 + 1e-6);
+	int axis = -1;
+
+	for (int k = 0; k < 3; k++)
+		if (p->hi[k] - p->lo[k] > longest * (axis < 0 ? 1 : 1 + 1e-6)) {
+			longest = p->hi[k] - p->lo[k];
+			axis = k;
+		}
+	return axis;
+}
+
+/* Does an element turn away from the mean normal by more than the cone? */
+static int too_curved(const struct divider *d, const struct piece *p)
+{
+	double mean[3] = { 0 };
+
+	for (uint32_t i = p->begin; i < p->end; i++)
+		v3_mad(mean, 1, &d->area[3 * (size_t)d->order[i]], mean);
+	double bound = d->cos_cone * v3_length(mean);
+	for (uint32_t i = p->begin; i < p->end; i++) {
+		const double *n = &d->area[3 * (size_t)d->order[i]];
+		double length = v3_length(n);
+		if (!(v3_dot(n, mean) >= (bound - 1e-9 * v3_length(mean)) * length))
+			return 1;
+	}
+	return 0;
+}
+
+/* Sums over a piece for one axis of its frame. */
+struct bend {
+	double lo, hi;          /* range of the centroids */
+	double score;           /* how much the normal changes along the axis */
+};
+
+/* Covariance of position and normal over the deviation of the position: along a
+ * cylinder nothing bends, across it everything does. */
+static struct bend measure_bend(const struct divider *d, const struct piece *p, int axis)
+{
+	struct bend b = { INFINITY, -INFINITY, 0 };
+	double n = p->end - p->begin, sx = 0, sxx = 0, sn[3] = { 0 }, sxn[3] = { 0 }, c[3];
+
+	for (uint32_t i = p->begin; i < p->end; i++) {
+		double normal[3], x = v3_dot(&d->centroid[3 * (size_t)d->order[i]],
+		                             d->region[p->region].axis[axis]);
+		b.lo = fmin(b.lo, x);
+		b.hi = fmax(b.hi, x);
+		x -= .5 * (p->lo[axis] + p->hi[axis]);
+		memcpy(normal, &d->area[3 * (size_t)d->order[i]], sizeof normal);
+		v3_normalise(normal);
+		sx += x;
+		sxx += x * x;
+		v3_mad(sn, 1, normal, sn);
+		v3_mad(sxn, x, normal, sxn);
+	}
+	v3_mad(sxn, -sx / n, sn, c);
+	double variance = sxx - sx * sx / n;
+	if (variance > 1e-12 * sxx)
+		b.score = v3_length(c) / sqrt(variance);
+	return b;
+}
+
+/* Halves a piece where it bends most. */
+static int cut_bend(struct divider *d, const struct piece *p)
+{
+	struct bend best = { 0 };
+	int axis = -1;
+
+	for (int k = 0; k < 3; k++) {
+		struct bend b = measure_bend(d, p, k);
+		if (b.hi > b.lo && (axis < 0 || b.score > best.score * (1 + 1e-6))) {
+			best = b;
+			axis = k;
+		}
+	}
+	if (axis >= 0 && .5 * (best.lo + best.hi) > best.lo)
+		return cut(d, p, axis, .5 * (best.lo + best.hi));
+	/* All centroids coincide: any halves will do. */
+	uint32_t middle = p->begin + (p->end - p->begin) / 2;
+	return push_connected(d, p->begin, middle, p) || push_connected(d, middle, p->end, p) ? -1
+	                                                                                      : 0;
+}
+
+/* Works through the list; pieces that need no cut become patches. */
+static int divide(struct divider *d, uint32_t *patch, size_t *count)
+{
+	while (d->todo.n) {
+		struct piece p = ((struct piece *)d->todo.data)[--d->todo.n];
+		int axis = p.end - p.begin > 1 ? too_long(d, &p) : -1;
+		if (axis >= 0) {
+			if (cut(d, &p, axis, .5 * (p.lo[axis] + p.hi[axis])))
+				return -1;
+		} else if (p.end - p.begin > 1 && too_curved(d, &p)) {
+			if (cut_bend(d, &p))
+				return -1;
+		} else {
+			for (uint32_t i = p.begin; i < p.end; i++)
+				patch[d->order[i]] = (uint32_t)*count;
+			(*count)++;
+		}
+	}
+	return 0;
+}
+
+static void element_centroids(struct divider *d)
+{
+	const struct model *m = d->m;
+	double lo[3], hi[3];
+
+	scene_box(m, lo, hi);
+	v3_mad(lo, 1, hi, d->centre);
+	for (int k = 0; k < 3; k++)
+		d->centre[k] *= .5;
+	for (size_t i = 0; i < m->elements; i++) {
+		const uint32_t *c = &m->element[3 * i];
+		for (size_t k = 0; k < 3; k++) {
+			double x[3];
+			v3_sub(&m->vertex[3 * (size_t)c[k]], d->centre, x);
+			v3_mad(&d->centroid[3 * i], 1. / 3, x, &d->centroid[3 * i]);
+		}
+		v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
+		        &m->vertex[3 * (size_t)c[2]], &d->area[3 * i]);
+	}
+}
+
+/* Puts the regions on the list: order becomes the elements by region. */
+static int push_regions(struct divider *d, const uint32_t *region, size_t regions)
+{
+	const struct model *m = d->m;
+	const struct piece all = { .lo = { -INFINITY, -INFINITY, -INFINITY },
+		                   .hi = { INFINITY, INFINITY, INFINITY } };
+	uint32_t *start = mem_new(regions + 1, sizeof *start, "regions", d->e);
+	int status = start ? 0 : -1;
+
+	for (size_t i = 0; start && i < m->elements; i++)
+		start[region[m->element_triangle[i]] + 1]++;
+	for (size_t r = 0; start && r < regions; r++)
+		start[r + 1] += start[r];
+	for (size_t i = m->elements; start && i-- > 0;)
+		d->order[--start[region[m->element_triangle[i]] + 1]] = (uint32_t)i;
+	/* start[r + 1] now is the beginning of region r. */
+	for (size_t r = 0; !status && r < regions; r++) {
+		struct piece p = all;
+		p.region = (uint32_t)r;
+		status = push_connected(d, start[r + 1],
+		                        r + 1 < regions ? start[r + 2] : (uint32_t)m->elements,
+		                        &p);
+	}
+	free(start);
+	return status;
+}
+
+static int allocate(struct divider *d)
+{
+	size_t n = d->m->elements;
+
+	if (edges_build(&d->g, d->m->element, n, d->m->vertices, d->e))
+		return -1;
+	d->centroid = mem_new(n, 3 * sizeof *d->centroid, "patches", d->e);
+	d->area = mem_new(n, 3 * sizeof *d->area, "patches", d->e);
+	d->order = mem_new(n, sizeof *d->order, "patches", d->e);
+	d->queue = mem_new(n, sizeof *d->queue, "patches", d->e);
+	d->label = mem_new(n, sizeof *d->label, "patches", d->e);
+	d->edge_label = mem_new(d->g.n, sizeof *d->edge_label, "patches", d->e);
+	return d->centroid && d->area && d->order && d->queue && d->label && d->edge_label ? 0
+	                                                                                   : -1;
+}
+
+int find_patches(const struct model *m, double size, double cos_cone, uint32_t *patch,
+                 size_t *count, struct err *e)
+{
+	int status = -1;
+	size_t regions;
+	struct divider d = { .m = m, .size = size, .cos_cone = cos_cone, .e = e };
+	uint32_t *region = mem_new(m->triangles, sizeof *region, "regions", e);
+
+	*count = 0;
+	if (!region || find_regions(m, size, cos_cone, region, &d.region, &regions, e) ||
+	    allocate(&d))
+		goto done;
+	element_centroids(&d);
+	if (push_regions(&d, region, regions))
+		goto done;
+	status = divide(&d, patch, count);
+done:
+	edges_free(&d.g);
+	free(region);
+	free(d.region);
+	free(d.centroid);
+	free(d.area);
+	free(d.order);
+	free(d.queue);
+	free(d.label);
+	free(d.edge_label);
+	free(d.todo.data);
+	return status;
+}
