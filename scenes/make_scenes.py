@@ -278,7 +278,7 @@ def two_pass():
 
     # The screen closes the back right corner; a lantern stands behind it.
     folds = [(2.62, .22), (3.08, .52), (3.34, 1.02), (3.82, 1.24)]
-    s.shape("screen", upright(folds, 0, 1.7), paper)
+    s.shape("paper screen", upright(folds, 0, 1.7), paper)
     s.shape("lattice", slats(folds, .03, 1.67, 5, .02), wood)
     s.shape("lantern", Shape().box((3.40, .75, .38), (3.62, 1.05, .60)), glow)
     s.shape("lantern foot", Shape().box((3.46, 0, .44), (3.56, .70, .54), skip="y"), wood)
