@@ -118,6 +118,22 @@ uint32_t chains_child(struct chains *c, uint32_t chain, uint32_t event, struct e
 	return child;
 }
 
+void chains_tie(struct chains *c)
+{
+	for (uint32_t i = 1; i < c->n; i++) {
+		uint32_t *count = (uint32_t *)c->count.data + (size_t)i * c->events;
+		for (uint32_t k = 0; k < c->events; k++) {
+			if (!count[k])
+				continue;
+			count[k]--; /* the parent's counts, looked up in place */
+			uint32_t parent = c->hash[place(c, count)];
+			count[k]++;
+			if (parent != CHAIN_NONE)
+				((uint32_t *)c->child.data)[(size_t)parent * c->events + k] = i;
+		}
+	}
+}
+
 uint32_t chains_reverse(struct chains *c, uint32_t chain, struct err *e)
 {
 	uint32_t *count, found = CHAIN_NONE;

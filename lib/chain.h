@@ -39,6 +39,10 @@ uint32_t chains_find(struct chains *c, const uint32_t *count, struct err *e);
 /* The chain after one more event (by index). */
 uint32_t chains_child(struct chains *c, uint32_t chain, uint32_t event, struct err *e);
 
+/* Ties every chain to the chains it comes from, where these exist: afterwards
+ * `child` is complete and can be read without making chains. O(chains events^2). */
+void chains_tie(struct chains *c);
+
 /* The chain as light sees it that travels the other way: straight-through events
  * are met from the other side. CHAIN_NONE where such light cannot pass (without
  * an error) or when out of memory. */

@@ -218,7 +218,7 @@ static uint64_t run_end(const struct transport *t, const struct ff *f, uint64_t 
 struct pass {
 	struct transport *t;
 	const struct link_key *link;
-	const size_t *first_row, *first_block; /* by shard */
+	const size_t *first_block;             /* by shard */
 	const uint8_t *has_lobe;
 	int fill;                              /* 0: count runs, 1: write them */
 };
@@ -297,7 +297,7 @@ static int join(struct transport *t, int threads, struct err *e)
 {
 	size_t row = 0, block = 0, link = 0;
 	struct link_key *l = mem_new(t->links, sizeof *l, "links", e);
-	size_t *first = mem_new(t->shards, 2 * sizeof *first, "shards", e);
+	size_t *first = mem_new(t->shards, sizeof *first, "shards", e);
 	uint8_t *has_lobe = mem_new(2 * t->m->patches, 1, "patch flags", e);
 	struct pass p = { .t = t, .link = l, .has_lobe = has_lobe };
 	int bad = !l || !first || !has_lobe;
@@ -306,8 +306,7 @@ static int join(struct transport *t, int threads, struct err *e)
 		uint32_t *chain = common_chains(t, t->shard[i], e);
 		if ((bad = !chain))
 			break;
-		first[i] = row;
-		first[t->shards + i] = block;
+		first[i] = block;
 		put_rows(t, i, chain, row, block);
 		put_links(t->shard[i], chain, (uint32_t)row, l + link);
 		row += t->shard[i]->rows;
@@ -316,9 +315,9 @@ static int join(struct transport *t, int threads, struct err *e)
 		free(chain);
 	}
 	if (!bad) {
+		chains_tie(&t->chains);
 		sort_links(t, l);
-		p.first_row = first;
-		p.first_block = first + t->shards;
+		p.first_block = first;
 		for (uint32_t ps = 0; ps < 2 * t->m->patches; ps++)
 			has_lobe[ps] = t->target_link[ps + 1] > t->target_link[ps];
 		bad = make_runs(&p, threads, e);

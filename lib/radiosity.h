@@ -1,0 +1,69 @@
+/* The radiosity solution by progressive shooting with memory of direction.
+ *
+ * A shot sends all unshot flux of one patch-side: its own emission, what leaves it
+ * diffusely, and, source by source, what leaves by the lobes about R and T of the
+ * light that arrived on it (the paper's arrays of unshot radiosity, kept only for
+ * sources that a directional patch really sees: the links of a .ff file). Shots go
+ * in rounds: a round shoots every patch-side, in index order, that holds at least
+ * half of the largest relative unshot flux at its beginning.
+ *
+ * Shots work on flux summed by patch; elements get their irradiance at the end, in
+ * one pass over the form factors with the total that each row has sent. */
+#ifndef TWOPASS_RADIOSITY_H
+#define TWOPASS_RADIOSITY_H
+
+#include "par.h"
+#include "solution.h"
+#include "transport.h"
+
+struct radiosity_options {
+	double stop;           /* unshot / emitted of each connected component */
+	uint64_t max_shots;    /* in this run; UINT64_MAX = no limit */
+	int threads;
+};
+
+struct radiosity_step {    /* after each round */
+	uint64_t round, shots;
+	int bands;
+	const double *unshot;  /* [bands] */
+	const double *emitted; /* [bands] */
+	double residual;       /* of the ledger, relative to what was emitted */
+};
+
+struct radiosity_hooks {
+	void (*step)(void *arg, const struct radiosity_step *s); /* may be NULL */
+	void *arg;
+};
+
+struct radiosity_report {
+	uint64_t rounds;
+	int components;        /* connected parts that have an emitter */
+	double unshot;         /* unshot / emitted, the worst component and band */
+	double residual;       /* largest ledger residual of any shot or round */
+	double bound;          /* certified: sum over elements of area |H - H*| from
+	                          unshot flux, over emitted flux; INFINITY = no finite bound */
+	double guessed;        /* flux that used a link of another source, over emitted */
+	double gather_bytes;   /* of form factors read by the pass over elements */
+};
+
+/* Zeroed state for a model and its transport with all emission unshot.
+ * 0, or -1 and e ("no emitter" if nothing emits). */
+int solution_begin(struct solution *s, const struct model *m, const struct transport *t,
+                   struct err *e);
+
+/* Shoots until `stop` or max_shots. "no steady state" if light reaches a closed
+ * part that absorbs nothing. O(shots x runs of a row). 0, or -1 and e. */
+int radiosity_shoot(struct solution *s, const struct transport *t,
+                    const struct radiosity_options *o, const struct radiosity_hooks *hooks,
+                    struct radiosity_report *r, struct err *e);
+
+/* Irradiance of all element-sides and its standard error from what the rows have
+ * sent. O(entries). 0, or -1 and e. */
+int radiosity_gather(struct solution *s, const struct transport *t, int threads,
+                     struct radiosity_report *r, struct err *e);
+
+/* An upper bound, per unit of unshot flux, of the flux that will still arrive
+ * anywhere; INFINITY if it cannot be bounded. */
+double radiosity_tail_bound(const struct transport *t);
+
+#endif

@@ -1,0 +1,175 @@
+#include "send.h"
+
+#include <stdlib.h>
+
+#include "bsdf.h"
+#include "mem.h"
+
+int sender_init(struct sender *s, const struct transport *t, struct err *e)
+{
+	*s = (struct sender){ .t = t, .m = t->m, .bands = t->m->bands };
+	s->chain_flux = mem_new(t->chains.n, (size_t)s->bands * sizeof(double), "chain flux", e);
+	s->touched = mem_new(t->chains.n, sizeof *s->touched, "chain flux", e);
+	s->is_touched = mem_new(t->chains.n, 1, "chain flux", e);
+	return s->chain_flux && s->touched && s->is_touched ? 0 : -1;
+}
+
+void sender_free(struct sender *s)
+{
+	free(s->chain_flux);
+	free(s->touched);
+	free(s->is_touched);
+	*s = (struct sender){ 0 };
+}
+
+static void into_chain(struct sender *s, uint32_t chain, const double *x, const double *part)
+{
+	double *flux = s->chain_flux + (size_t)chain * (size_t)s->bands;
+
+	if (!s->is_touched[chain]) {
+		s->is_touched[chain] = 1;
+		s->touched[s->touches++] = chain;
+	}
+	for (int k = 0; k < s->bands; k++)
+		flux[k] += x[k] * part[k];
+}
+
+/* Flux x of chain c on ideal patch-side: what goes on by R and by T. Chains that no
+ * sample of the row followed stay in chain_flux and end up as cut. */
+static void go_on(struct sender *s, uint32_t chain, uint32_t material, int side,
+                  const double *x)
+{
+	const struct materials *mt = &s->m->material;
+	const struct chains *c = &s->t->chains;
+	size_t at = material_at(mt, material, side);
+
+	for (int transmitted = 0; transmitted < 2; transmitted++) {
+		uint32_t slot = c->slot[4 * material + 2 * (uint32_t)side + (uint32_t)transmitted];
+		if (slot == CHAIN_NONE)
+			continue;
+		uint32_t child = ((const uint32_t *)c->child.data)[(size_t)chain * c->events + slot];
+		/* Chain 0 cannot be a child: it marks flux that no row follows. */
+		into_chain(s, child == CHAIN_NONE ? 0 : child, x,
+		           (transmitted ? mt->tau_s : mt->rho_s) + at);
+	}
+}
+
+/* Takes the flux that waits for a chain. */
+static void take(struct sender *s, uint32_t chain, double *x)
+{
+	double *flux = s->chain_flux + (size_t)chain * (size_t)s->bands;
+
+	for (int k = 0; k < s->bands; k++) {
+		x[k] = flux[k];
+		flux[k] = 0;
+	}
+}
+
+static void finish(struct sender *s, double *cut)
+{
+	double x[BANDS_MAX];
+
+	for (size_t i = 0; i < s->touches; i++) {
+		take(s, s->touched[i], x);
+		for (int k = 0; cut && k < s->bands; k++)
+			cut[k] += x[k];
+		s->is_touched[s->touched[i]] = 0;
+	}
+	s->touches = 0;
+}
+
+/* Splits flux x arriving at a run's patch-side into what is absorbed and what is
+ * unshot again. */
+static void deposit(struct sender *s, struct solution *sol, const struct run *r, int to,
+                    const double *x, struct sent *sent)
+{
+	const struct materials *mt = &s->m->material;
+	uint32_t material = model_patch_material(s->m, r->target >> 1);
+	int side = (int)(r->target & 1), bands = s->bands;
+	size_t at = material_at(mt, material, side);
+	double *here = sol->unshot_diffuse + (size_t)r->target * (size_t)bands;
+	double *there = sol->unshot_diffuse + (size_t)(r->target ^ 1) * (size_t)bands;
+	int lobe_r = bsdf_has_lobe(mt, material, side, 0);
+	int lobe_t = bsdf_has_lobe(mt, material, side, 1);
+	double *link = r->link == FF_NO_ROW ? NULL
+	             : sol->unshot_link + (2 * (size_t)r->link + (size_t)to) * (size_t)bands;
+
+	for (int k = 0; k < bands; k++) {
+		size_t i = at + (size_t)k;
+		double lobes = (lobe_r ? mt->rho_s[i] : 0) + (lobe_t ? mt->tau_s[i] : 0);
+		double albedo = mt->rho_d[i] + mt->tau_d[i] + mt->rho_s[i] + mt->tau_s[i];
+		double kept = (mt->rho_d[i] + mt->tau_d[i]) * x[k];
+		here[k] += mt->rho_d[i] * x[k];
+		there[k] += mt->tau_d[i] * x[k];
+		sent->absorbed[k] += (1 - albedo) * x[k];
+		if (link) {
+			link[k] += lobes * x[k];
+			kept += lobes * x[k];
+			sent->guessed[k] += r->guessed ? lobes * x[k] : 0;
+		} else {
+			sent->cut[k] += lobes * x[k];
+		}
+		sent->kept[k] += kept;
+	}
+}
+
+void send_row(struct sender *s, struct solution *sol, uint32_t row, int freshness,
+              const double *flux, struct sent *sent)
+{
+	const struct transport *t = s->t;
+	int bands = s->bands;
+
+	for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
+		const struct block *block = &t->block[b];
+		double in[BANDS_MAX], x[BANDS_MAX], any = 0;
+		if (block->chain)
+			take(s, block->chain, in);
+		for (int k = 0; k < bands; k++) {
+			in[k] = (block->chain ? in[k] : flux[k]) / (block->sum > 0 ? block->sum : 1);
+			any += in[k];
+		}
+		if (!(any > 0))
+			continue;
+		for (int k = 0; k < bands; k++) {
+			sent->escaped[k] += in[k] * block->escape;
+			sent->absorbed[k] += in[k] * block->black;
+			sent->lost[k] += in[k] * block->lost;
+			sent->cut[k] += in[k] * block->cut;
+		}
+		for (uint64_t i = block->run; i < block[1].run; i++) {
+			const struct run *r = &t->run[i];
+			for (int k = 0; k < bands; k++)
+				x[k] = in[k] * r->sum;
+			deposit(s, sol, r, freshness, x, sent);
+			if (t->chains.events)
+				go_on(s, block->chain, model_patch_material(s->m, r->target >> 1),
+				      (int)(r->target & 1), x);
+		}
+	}
+	finish(s, sent->cut);
+}
+
+void send_block_flux(struct sender *s, uint32_t row, const double *flux, double *block_flux)
+{
+	const struct transport *t = s->t;
+	int bands = s->bands;
+
+	for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
+		const struct block *block = &t->block[b];
+		double *in = block_flux + (b - t->row_block[row]) * (size_t)bands;
+		double x[BANDS_MAX];
+		if (block->chain)
+			take(s, block->chain, in);
+		else
+			for (int k = 0; k < bands; k++)
+				in[k] = flux[k];
+		for (uint64_t i = block->run; t->chains.events && i < block[1].run; i++) {
+			const struct run *r = &t->run[i];
+			for (int k = 0; k < bands; k++)
+				x[k] = block->sum > 0 ? in[k] / block->sum * r->sum : 0;
+			go_on(s, block->chain, model_patch_material(s->m, r->target >> 1),
+			      (int)(r->target & 1), x);
+		}
+	}
+	finish(s, NULL);
+}
