@@ -144,7 +144,7 @@ int cache_write_info(struct container_writer *w, const char *format,
 	};
 
 	for (size_t k = 0; k < sizeof meta / sizeof *meta; k++)
-		if (meta[k].value && container_meta(w, meta[k].key, meta[k].value, e))
+		if (meta[k].value && *meta[k].value && container_meta(w, meta[k].key, meta[k].value, e))
 			return -1;
 	return 0;
 }
@@ -158,11 +158,14 @@ static int read_text(const struct container *c, const char *key, char **out, str
 	return 0;
 }
 
+/* Which ids a file has depends on its kind; readers compare those they need. */
 static int read_id(const struct container *c, const char *key, char hex[33], struct err *e)
 {
 	const char *text = container_get_meta(c, key);
 
-	if (!text || strlen(text) != ID_DIGITS)
+	if (!text)
+		return 0;
+	if (strlen(text) != ID_DIGITS)
 		return container_refuse(c, e, "metadata %s: not %d hexadecimal digits", key,
 		                        ID_DIGITS);
 	memcpy(hex, text, ID_DIGITS + 1);
@@ -198,11 +201,12 @@ int cache_write_names(struct container_writer *w, const char *key, char *const *
 
 	for (size_t i = 0; i < n && !failed; i++)
 		if (json_array_append_new(list, json_string(name[i])))
-			failed = err_set(e, "cannot write: %s: name %zu is not UTF-8 text", key, i);
+			failed = err_set(e, "%s: cannot write: name %zu of %s is not UTF-8 text",
+			                 container_writer_path(w), i, key);
 	char *text = failed ? NULL : json_dumps(list, JSON_COMPACT);
 	json_decref(list);
 	if (!failed && !text)
-		failed = err_set(e, "out of memory: names of %s", key);
+		failed = err_set(e, "%s: out of memory", container_writer_path(w));
 	failed = failed || container_meta(w, key, text, e);
 	free(text);
 	return failed ? -1 : 0;

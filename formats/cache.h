@@ -30,7 +30,8 @@ void cache_ids(const struct model *m, struct cache_info *i);
 /* Digest of one camera (32 hex digits). */
 void cache_camera_id(const struct camera *c, char hex[33]);
 
-/* Writes / reads the info as __metadata__ strings. cache_read_info checks version. */
+/* Writes / reads the info as __metadata__ strings, leaving out what is NULL or "".
+ * cache_read_info checks version. */
 int cache_write_info(struct container_writer *w, const char *format,
                      const struct cache_info *i, struct err *e);
 int cache_read_info(const struct container *c, struct cache_info *i, struct err *e);

@@ -38,6 +38,9 @@ int container_write(struct container_writer *w, int array, const void *data, siz
 int container_put(struct container_writer *w, const char *name, enum dtype t, int dims,
                   const uint64_t *shape, const void *data, struct err *e);
 
+/* The path as given to container_create, for messages. */
+const char *container_writer_path(const struct container_writer *w);
+
 /* Adds or replaces a string of __metadata__. */
 int container_meta(struct container_writer *w, const char *key, const char *value,
                    struct err *e);

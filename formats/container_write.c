@@ -76,6 +76,11 @@ struct container_writer *container_create(const char *path, struct err *e)
 	return NULL;
 }
 
+const char *container_writer_path(const struct container_writer *w)
+{
+	return w->path;
+}
+
 int container_meta(struct container_writer *w, const char *key, const char *value,
                    struct err *e)
 {

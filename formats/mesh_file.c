@@ -138,8 +138,11 @@ int mesh_put_model(struct container_writer *w, const struct model *m, struct err
 {
 	struct field f[FIELDS_MAX];
 	struct model view = *m; /* the list points at pointers: those of this copy */
+	struct err why = { 0 };
 
-	return model_check(m, e) || fields_put(w, f, model_fields(&view, f), e) ||
+	if (model_check(m, &why))
+		return err_set(e, "%s: cannot write: %s", container_writer_path(w), why.text);
+	return fields_put(w, f, model_fields(&view, f), e) ||
 	       put_cameras(w, m, e) ||
 	       container_meta(w, "lobe", m->lobe == LOBE_PAPER ? "paper" : "reciprocal", e) ||
 	       cache_write_names(w, "materials", m->material.name, m->material.n, e) ||
@@ -151,14 +154,13 @@ int mesh_file_write(const char *path, const struct model *m, const struct cache_
 {
 	struct container_writer *w = container_create(path, e);
 	struct cache_info info = *i;
-	struct err why = { 0 };
 
 	if (!w)
 		return -1;
 	cache_ids(m, &info); /* those of this very model */
-	if (mesh_put_model(w, m, &why) || cache_write_info(w, FORMAT, &info, &why)) {
+	if (mesh_put_model(w, m, e) || cache_write_info(w, FORMAT, &info, e)) {
 		container_abandon(w);
-		return err_set(e, "%s: cannot write: %s", path, why.text);
+		return -1;
 	}
 	return container_finish(w, e);
 }

@@ -15,8 +15,7 @@ int mesh_file_write(const char *path, const struct model *m, const struct cache_
 int mesh_file_read(const char *path, struct model *m, struct cache_info *i, struct err *e);
 
 /* The model's part of a container, shared with .rad files. What is put is checked
- * as what is got: no file is written that would be refused. Errors of put do not
- * name the file; get frees m on failure. */
+ * as what is got: no file is written that would be refused. Get frees m on failure. */
 int mesh_put_model(struct container_writer *w, const struct model *m, struct err *e);
 int mesh_get_model(const struct container *c, struct model *m, struct err *e);
 

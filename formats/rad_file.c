@@ -38,9 +38,11 @@ static int put_solution(struct container_writer *w, const struct model *m,
 	struct field f[FIELDS_MAX];
 	struct solution view = *s; /* the list points at pointers: those of this copy */
 	uint64_t *shots = &view.shots;
+	struct err why = { 0 };
 
-	return solution_check(m, s, e) ||
-	       fields_put(w, f, solution_fields(&view, &shots, f), e) ? -1 : 0;
+	if (solution_check(m, s, &why))
+		return err_set(e, "%s: cannot write: %s", container_writer_path(w), why.text);
+	return fields_put(w, f, solution_fields(&view, &shots, f), e) ? -1 : 0;
 }
 
 int rad_file_write(const char *path, const struct model *m, const struct solution *s,
@@ -48,15 +50,14 @@ int rad_file_write(const char *path, const struct model *m, const struct solutio
 {
 	struct container_writer *w = container_create(path, e);
 	struct cache_info info = *i;
-	struct err why = { 0 };
 
 	if (!w)
 		return -1;
 	cache_ids(m, &info);
-	if (mesh_put_model(w, m, &why) || put_solution(w, m, s, &why) ||
-	    cache_write_info(w, FORMAT, &info, &why)) {
+	if (mesh_put_model(w, m, e) || put_solution(w, m, s, e) ||
+	    cache_write_info(w, FORMAT, &info, e)) {
 		container_abandon(w);
-		return err_set(e, "%s: cannot write: %s", path, why.text);
+		return -1;
 	}
 	return container_finish(w, e);
 }

@@ -1,0 +1,159 @@
+#include "ff_file.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "fields.h"
+
+#define FORMAT "twopass.ff"
+
+/* Sizes from the arrays that have them to themselves. */
+static int get_counts(const struct container *c, struct ff *f, struct err *e)
+{
+	if (fields_size(c, "chain_start", DT_U64, 1, 0, &f->chains, e) ||
+	    fields_size(c, "chain_event", DT_U32, 1, 0, &f->chain_events, e) ||
+	    fields_size(c, "row_side", DT_U32, 1, 0, &f->rows, e) ||
+	    fields_size(c, "block_chain", DT_U32, 1, 0, &f->blocks, e) ||
+	    fields_size(c, "column", DT_U32, 1, 0, &f->entries, e) ||
+	    fields_size(c, "arrival_target", DT_U32, 1, 0, &f->arrivals, e) ||
+	    fields_size(c, "link_target", DT_U32, 1, 0, &f->links, e))
+		return -1;
+	if (f->chains == 0)
+		return container_refuse(c, e, "array chain_start: it is empty");
+	f->chains--; /* starts are one more than what they start */
+	return 0;
+}
+
+static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
+                      struct err *e)
+{
+	const struct container_view *v = container_find(c, "value");
+	const int f64 = v && v->type == DT_F64;
+	const struct field field[] = {
+		{ &f->chain_start, "chain_start", DT_U64, 1, { f->chains + 1 } },
+		{ &f->chain_event, "chain_event", DT_U32, 1, { f->chain_events } },
+		{ &f->chain_count, "chain_count", DT_U32, 1, { f->chain_events } },
+		{ &f->row_side, "row_side", DT_U32, 1, { f->rows } },
+		{ &f->row_kind, "row_kind", DT_U8, 1, { f->rows } },
+		{ &f->row_samples, "row_samples", DT_U32, 1, { f->rows } },
+		{ &f->row_scale, "row_scale", DT_F64, 1, { f->rows } },
+		{ &f->row_residual, "row_residual", DT_F64, 1, { f->rows } },
+		{ &f->row_error, "row_error", DT_F64, 1, { f->rows } },
+		{ &f->row_block, "row_block", DT_U64, 1, { f->rows + 1 } },
+		{ &f->block_chain, "block_chain", DT_U32, 1, { f->blocks } },
+		{ &f->block_start, "block_start", DT_U64, 1, { f->blocks + 1 } },
+		{ &f->block_escape, "block_escape", DT_F64, 1, { f->blocks } },
+		{ &f->block_black, "block_black", DT_F64, 1, { f->blocks } },
+		{ &f->block_lost, "block_lost", DT_F64, 1, { f->blocks } },
+		{ &f->block_cut, "block_cut", DT_F64, 1, { f->blocks } },
+		{ &f->block_arrival, "block_arrival", DT_U64, 1, { f->blocks + 1 } },
+		{ &f->column, "column", DT_U32, 1, { f->entries } },
+		{ &f->arrival_target, "arrival_target", DT_U32, 1, { f->arrivals } },
+		{ &f->arrival_direction, "arrival_direction", DT_F32, 2, { f->arrivals, 3 } },
+		{ &f->link_target, "link_target", DT_U32, 1, { f->links } },
+		{ &f->link_source, "link_source", DT_U32, 1, { f->links } },
+		{ &f->link_chain, "link_chain", DT_U32, 1, { f->links } },
+		{ &f->link_direction, "link_direction", DT_F32, 2, { f->links, 3 } },
+		{ &f->link_row, "link_row", DT_U32, 2, { f->links, 2 } },
+		{ part, "part", DT_U32, 1, { 4 } },
+		{ f64 ? (void *)&f->value64 : (void *)&f->value, "value",
+		  f64 ? DT_F64 : DT_F32, 1, { f->entries } },
+	};
+
+	return fields_map(c, field, sizeof field / sizeof *field, e);
+}
+
+static int map_ff(const struct container *c, struct ff *f, struct err *e)
+{
+	uint32_t *part = NULL;
+
+	if (get_counts(c, f, e) || map_arrays(c, f, &part, e))
+		return -1;
+	f->patch_begin = part[0];
+	f->patch_end = part[1];
+	f->part = part[2];
+	f->parts = part[3];
+	return 0;
+}
+
+static int map_scene(struct ff_file *o, struct err *e)
+{
+	struct ff_scene *s = &o->scene;
+	const struct container *c = o->container;
+	const uint64_t *counts = NULL;
+	const struct field number = { &counts, "model_counts", DT_U64, 1, { 4 } };
+
+	if (fields_map(c, &number, 1, e))
+		return -1;
+	if (counts[0] >= INT32_MAX || counts[1] >= INT32_MAX || counts[2] >= INT32_MAX)
+		return container_refuse(c, e, "array model_counts: impossible");
+	s->patches = (size_t)counts[0];
+	s->elements = (size_t)counts[1];
+	s->materials = (size_t)counts[2];
+	o->surfaces = (size_t)counts[3];
+	o->patches = (uint32_t)counts[0];
+	const struct field field[] = {
+		{ &s->patch_area, "patch_area", DT_F64, 1, { s->patches } },
+		{ &s->patch_start, "patch_start", DT_U32, 1, { s->patches + 1 } },
+		{ &s->patch_sides, "patch_sides", DT_U8, 1, { s->patches } },
+		{ &o->patch_surface, "patch_surface", DT_U32, 1, { s->patches } },
+	};
+	if (fields_map(c, field, sizeof field / sizeof *field, e))
+		return -1;
+	if (s->patch_start[s->patches] != s->elements)
+		return container_refuse(c, e, "array patch_start: it ends with %" PRIu32 " of %zu "
+		                        "elements", s->patch_start[s->patches], s->elements);
+	for (size_t p = 0; p < s->patches; p++)
+		if (o->patch_surface[p] >= o->surfaces)
+			return container_refuse(c, e, "array patch_surface: value %zu is %" PRIu32
+			                        " of %zu surfaces", p, o->patch_surface[p],
+			                        o->surfaces);
+	return cache_read_names(c, "surfaces", &o->surface_name, o->surfaces, e);
+}
+
+static int check_model(const struct ff_file *o, const struct model *m,
+                       const struct cache_info *m_info, struct err *e)
+{
+	int other = m_info && strcmp(m_info->geometry_id, o->info.geometry_id) != 0;
+
+	if (m && !other)
+		other = m->patches != o->scene.patches || m->elements != o->scene.elements ||
+		        m->material.n != o->scene.materials ||
+		        memcmp(m->patch_start, o->scene.patch_start,
+		               (m->patches + 1) * sizeof *m->patch_start) != 0;
+	return other ? container_refuse(o->container, e, "made for another geometry") : 0;
+}
+
+static int open_ff(const char *path, const struct model *m, const struct cache_info *m_info,
+                   struct ff_file *o, struct err *e)
+{
+	struct err why = { 0 };
+
+	/* Binding first: for a file of another scene the rest does not matter. */
+	if (!(o->container = container_open(path, FORMAT, e)) ||
+	    cache_read_info(o->container, &o->info, e) || map_scene(o, e) ||
+	    check_model(o, m, m_info, e) || container_verify_all(o->container, e) ||
+	    map_ff(o->container, &o->f, e))
+		return -1;
+	return ff_check(&o->f, &o->scene, &why) ? container_refuse(o->container, e, "%s", why.text)
+	                                        : 0;
+}
+
+int ff_file_open(const char *path, const struct model *m, const struct cache_info *m_info,
+                 struct ff_file *out, struct err *e)
+{
+	*out = (struct ff_file){ 0 };
+	if (open_ff(path, m, m_info, out, e) == 0)
+		return 0;
+	ff_file_close(out);
+	return -1;
+}
+
+void ff_file_close(struct ff_file *f)
+{
+	cache_names_free(f->surface_name, f->surfaces);
+	cache_info_free(&f->info);
+	container_close(f->container);
+	*f = (struct ff_file){ 0 };
+}

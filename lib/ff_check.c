@@ -1,0 +1,278 @@
+#include "ff_check.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include "mem.h"
+
+/* How well stored rows close: far above rounding, far below any real error. */
+static const double closure_slack = 1e-9;
+/* Directions are float32. */
+static const double unit_slack = 1e-3;
+
+/* start[0] = 0, never descending by less than `least`, start[n] = end. */
+static int ascends(const char *name, const uint64_t *start, size_t n, size_t end,
+                   uint64_t least, struct err *e)
+{
+	if (start[0] != 0 || start[n] != end)
+		return err_set(e, "array %s: it runs from %" PRIu64 " to %" PRIu64
+		               " and should from 0 to %zu", name, start[0], start[n], end);
+	for (size_t i = 0; i < n; i++)
+		if (start[i + 1] < start[i] || start[i + 1] - start[i] < least)
+			return err_set(e, "array %s: values %zu and %zu do not ascend as they should",
+			               name, i, i + 1);
+	return 0;
+}
+
+static int in_range(const char *name, const uint32_t *index, size_t n, size_t limit,
+                    struct err *e)
+{
+	for (size_t i = 0; i < n; i++)
+		if (index[i] >= limit)
+			return err_set(e, "array %s: value %zu is %" PRIu32 ", which must be below "
+			               "%zu", name, i, index[i], limit);
+	return 0;
+}
+
+static int not_negative(const char *name, const double *v, size_t n, struct err *e)
+{
+	for (size_t i = 0; i < n; i++)
+		if (!(v[i] >= 0 && isfinite(v[i])))
+			return err_set(e, "array %s: value %zu is %g", name, i, v[i]);
+	return 0;
+}
+
+static int unit_vectors(const char *name, const float *v, size_t n, struct err *e)
+{
+	for (size_t i = 0; i < n; i++) {
+		double x = (double)v[3 * i], y = (double)v[3 * i + 1], z = (double)v[3 * i + 2];
+		if (!(fabs(x * x + y * y + z * z - 1) <= 2 * unit_slack))
+			return err_set(e, "array %s: direction %zu is not a unit vector", name, i);
+	}
+	return 0;
+}
+
+/* ---- scene and chains ---- */
+
+static int check_scene(const struct ff_scene *s, struct err *e)
+{
+	if (s->elements == 0 || s->elements > INT32_MAX || s->patches == 0)
+		return err_set(e, "array patch_start: %zu patches of %zu elements", s->patches,
+		               s->elements);
+	if (s->patch_start[0] != 0)
+		return err_set(e, "array patch_start: it does not begin with 0");
+	for (size_t p = 0; p < s->patches; p++) {
+		if (s->patch_start[p + 1] <= s->patch_start[p])
+			return err_set(e, "array patch_start: patch %zu has no elements", p);
+		if (!(s->patch_area[p] > 0 && isfinite(s->patch_area[p])))
+			return err_set(e, "array patch_area: value %zu is %g", p, s->patch_area[p]);
+		if (s->patch_sides[p] != 1 && s->patch_sides[p] != 3)
+			return err_set(e, "array patch_sides: value %zu is %d, neither 1 nor 3", p,
+			               s->patch_sides[p]);
+	}
+	return 0;
+}
+
+static int check_chains(const struct ff *f, size_t materials, struct err *e)
+{
+	if (f->chains == 0)
+		return err_set(e, "array chain_start: there is no chain 0");
+	if (ascends("chain_start", f->chain_start, f->chains, f->chain_events, 0, e) ||
+	    in_range("chain_event", f->chain_event, f->chain_events, 4 * materials, e))
+		return -1;
+	if (f->chain_start[1] != 0)
+		return err_set(e, "array chain_start: chain 0 is not empty");
+	for (size_t c = 0; c < f->chains; c++)
+		for (uint64_t i = f->chain_start[c]; i < f->chain_start[c + 1]; i++) {
+			if (f->chain_count[i] == 0)
+				return err_set(e, "array chain_count: value %" PRIu64 " is 0", i);
+			if (i > f->chain_start[c] && f->chain_event[i] <= f->chain_event[i - 1])
+				return err_set(e, "array chain_event: values %" PRIu64 " and %" PRIu64
+				               " do not ascend", i - 1, i);
+		}
+	return 0;
+}
+
+static uint64_t chain_length(const struct ff *f, uint32_t chain)
+{
+	uint64_t n = 0;
+
+	for (uint64_t i = f->chain_start[chain]; i < f->chain_start[chain + 1]; i++)
+		n += f->chain_count[i];
+	return n;
+}
+
+/* ---- rows and blocks ---- */
+
+static int check_row(const struct ff *f, size_t r, struct err *e)
+{
+	uint32_t patch = f->row_side[r] >> 1;
+
+	if (patch < f->patch_begin || patch >= f->patch_end)
+		return err_set(e, "array row_side: row %zu leaves patch %" PRIu32 ", which is not "
+		               "in this part", r, patch);
+	if (f->row_kind[r] > FF_TRANSMITTED)
+		return err_set(e, "array row_kind: value %zu is %d", r, f->row_kind[r]);
+	if (!(f->row_scale[r] > 0 && isfinite(f->row_scale[r])))
+		return err_set(e, "array row_scale: value %zu is %g", r, f->row_scale[r]);
+	if (!isfinite(f->row_residual[r]))
+		return err_set(e, "array row_residual: value %zu is %g", r, f->row_residual[r]);
+	return 0;
+}
+
+/* Chain 0 first, then ascending length. */
+static int check_row_chains(const struct ff *f, size_t r, struct err *e)
+{
+	uint64_t begin = f->row_block[r], length = 0;
+
+	if (f->block_chain[begin] != 0)
+		return err_set(e, "array block_chain: row %zu does not begin with chain 0", r);
+	for (uint64_t b = begin + 1; b < f->row_block[r + 1]; b++) {
+		uint64_t n = chain_length(f, f->block_chain[b]);
+		if (n == 0 || n < length)
+			return err_set(e, "array block_chain: block %" PRIu64 " is out of order", b);
+		length = n;
+	}
+	return 0;
+}
+
+static int check_closure(const struct ff *f, size_t r, struct err *e)
+{
+	uint64_t b = f->row_block[r];
+	double sum = f->block_escape[b] + f->block_black[b] + f->block_lost[b] + f->block_cut[b];
+
+	for (uint64_t i = f->block_start[b]; i < f->block_start[b + 1]; i++)
+		sum += ff_value(f, i);
+	sum *= f->row_scale[r];
+	if (!(fabs(sum - 1) <= closure_slack))
+		return err_set(e, "array value: row %zu sums to %.12g instead of 1", r, sum);
+	return 0;
+}
+
+static int check_rows(const struct ff *f, struct err *e)
+{
+	if (ascends("row_block", f->row_block, f->rows, f->blocks, 1, e) ||
+	    ascends("block_start", f->block_start, f->blocks, f->entries, 0, e) ||
+	    ascends("block_arrival", f->block_arrival, f->blocks, f->arrivals, 0, e) ||
+	    in_range("block_chain", f->block_chain, f->blocks, f->chains, e) ||
+	    not_negative("row_error", f->row_error, f->rows, e) ||
+	    not_negative("block_escape", f->block_escape, f->blocks, e) ||
+	    not_negative("block_black", f->block_black, f->blocks, e) ||
+	    not_negative("block_lost", f->block_lost, f->blocks, e) ||
+	    not_negative("block_cut", f->block_cut, f->blocks, e))
+		return -1;
+	for (size_t r = 0; r < f->rows; r++)
+		if (check_row(f, r, e) || check_row_chains(f, r, e))
+			return -1;
+	return 0;
+}
+
+/* ---- entries and arrivals ---- */
+
+/* Columns of a block ascend by patch-side, then element. */
+static int check_block(const struct ff *f, const uint32_t *patch_of, size_t elements,
+                       uint64_t b, struct err *e)
+{
+	uint64_t last = 0;
+
+	for (uint64_t i = f->block_start[b]; i < f->block_start[b + 1]; i++) {
+		uint32_t column = f->column[i], element = column >> 1;
+		double v = ff_value(f, i);
+		if (element >= elements)
+			return err_set(e, "array column: value %" PRIu64 " is %" PRIu32 ", which must "
+			               "be below %zu", i, column, 2 * elements);
+		if (!(v >= 0 && isfinite(v)))
+			return err_set(e, "array value: value %" PRIu64 " is %g", i, v);
+		uint64_t side = 2 * (uint64_t)patch_of[element] + (column & 1);
+		uint64_t place = (side << 32 | element) + 1;
+		if (place <= last)
+			return err_set(e, "array column: value %" PRIu64 " is out of order", i);
+		last = place;
+	}
+	return 0;
+}
+
+static int check_entries(const struct ff *f, const struct ff_scene *s, struct err *e)
+{
+	uint32_t *patch_of = mem_new(s->elements, sizeof *patch_of, "patches of elements", e);
+	int failed = !patch_of;
+
+	for (size_t p = 0; p < s->patches && !failed; p++)
+		for (uint32_t i = s->patch_start[p]; i < s->patch_start[p + 1]; i++)
+			patch_of[i] = (uint32_t)p;
+	for (uint64_t b = 0; b < f->blocks && !failed; b++)
+		failed = check_block(f, patch_of, s->elements, b, e);
+	free(patch_of);
+	for (size_t r = 0; r < f->rows && !failed; r++)
+		failed = check_closure(f, r, e);
+	return failed ? -1 : 0;
+}
+
+/* ---- links ---- */
+
+static int check_link_row(const struct ff *f, size_t l, int transmitted, struct err *e)
+{
+	uint32_t row = f->link_row[2 * l + (size_t)transmitted], target = f->link_target[l];
+
+	if (row == FF_NO_ROW)
+		return 0;
+	if (row >= f->rows)
+		return err_set(e, "array link_row: link %zu has row %" PRIu32 " of %zu", l, row,
+		               f->rows);
+	/* Light through a sheet leaves its other side. */
+	if (f->row_kind[row] != (transmitted ? FF_TRANSMITTED : FF_REFLECTED) ||
+	    f->row_side[row] != (transmitted ? target ^ 1 : target))
+		return err_set(e, "array link_row: link %zu has row %" PRIu32 ", which is not one "
+		               "of its target", l, row);
+	return 0;
+}
+
+/* By target, then source, then chain; only direction bins may repeat. */
+static int link_order(const struct ff *f, size_t l)
+{
+	const uint32_t *key[] = { f->link_target, f->link_source, f->link_chain };
+
+	for (size_t k = 0; k < sizeof key / sizeof *key; k++)
+		if (key[k][l] != key[k][l - 1])
+			return key[k][l] > key[k][l - 1];
+	return f->link_source[l] == FF_ANY;
+}
+
+static int check_links(const struct ff *f, size_t patches, struct err *e)
+{
+	if (in_range("link_target", f->link_target, f->links, 2 * patches, e) ||
+	    in_range("link_chain", f->link_chain, f->links, f->chains, e) ||
+	    unit_vectors("link_direction", f->link_direction, f->links, e))
+		return -1;
+	for (size_t l = 0; l < f->links; l++) {
+		if (f->link_source[l] != FF_ANY && f->link_source[l] >= 2 * patches)
+			return err_set(e, "array link_source: value %zu is %" PRIu32, l,
+			               f->link_source[l]);
+		if (l && !link_order(f, l))
+			return err_set(e, "array link_target: link %zu is out of order", l);
+		if (check_link_row(f, l, 0, e) || check_link_row(f, l, 1, e))
+			return -1;
+	}
+	return 0;
+}
+
+static int check_part(const struct ff *f, size_t patches, struct err *e)
+{
+	if (f->patch_begin > f->patch_end || f->patch_end > patches)
+		return err_set(e, "array part: patches %" PRIu32 " to %" PRIu32 " of %zu",
+		               f->patch_begin, f->patch_end, patches);
+	if (f->part < 1 || f->part > f->parts)
+		return err_set(e, "array part: part %" PRIu32 " of %" PRIu32, f->part, f->parts);
+	return 0;
+}
+
+int ff_check(const struct ff *f, const struct ff_scene *s, struct err *e)
+{
+	return check_scene(s, e) || check_part(f, s->patches, e) ||
+	       check_chains(f, s->materials, e) || check_rows(f, e) ||
+	       check_entries(f, s, e) ||
+	       in_range("arrival_target", f->arrival_target, f->arrivals, 2 * s->patches, e) ||
+	       unit_vectors("arrival_direction", f->arrival_direction, f->arrivals, e) ||
+	       check_links(f, s->patches, e) ? -1 : 0;
+}
