@@ -10,9 +10,14 @@
 
 enum { FIELDS_MAX = 16 };
 
-/* The solution's arrays with shapes from its counts; shots is a number in the
- * struct and an array of one in the file. */
-static size_t solution_fields(struct solution *s, uint64_t **shots,
+/* What is a plain member of the struct and an array in the file. */
+struct plain {
+	uint64_t *shots;
+	double *round;
+};
+
+/* The solution's arrays with shapes from its counts. */
+static size_t solution_fields(struct solution *s, struct plain *plain,
                               struct field out[FIELDS_MAX])
 {
 	const uint64_t b = (uint64_t)s->bands, sides = s->element_sides, g = s->groups;
@@ -24,8 +29,10 @@ static size_t solution_fields(struct solution *s, uint64_t **shots,
 		{ &s->unshot_emission, "unshot_emission", DT_F64, 2, { s->patch_sides, b } },
 		{ &s->unshot_diffuse, "unshot_diffuse", DT_F64, 2, { s->patch_sides, b } },
 		{ &s->unshot_link, "unshot_link", DT_F64, 3, { s->links, 2, b } },
+		{ &s->shot, "shot", DT_F64, 3, { s->rows, 2, b } },
 		{ &s->ledger, "ledger", DT_F64, 2, { LEDGER_TERMS, b } },
-		{ shots, "shots", DT_U64, 1, { 1 } },
+		{ &plain->round, "round", DT_F64, 1, { 2 } },
+		{ &plain->shots, "shots", DT_U64, 1, { 1 } },
 	};
 
 	memcpy(out, f, sizeof f);
@@ -37,12 +44,12 @@ static int put_solution(struct container_writer *w, const struct model *m,
 {
 	struct field f[FIELDS_MAX];
 	struct solution view = *s; /* the list points at pointers: those of this copy */
-	uint64_t *shots = &view.shots;
+	struct plain plain = { &view.shots, view.round };
 	struct err why = { 0 };
 
 	if (solution_check(m, s, &why))
 		return err_set(e, "%s: cannot write: %s", container_writer_path(w), why.text);
-	return fields_put(w, f, solution_fields(&view, &shots, f), e) ? -1 : 0;
+	return fields_put(w, f, solution_fields(&view, &plain, f), e) ? -1 : 0;
 }
 
 int rad_file_write(const char *path, const struct model *m, const struct solution *s,
@@ -67,18 +74,23 @@ static int get_solution(const struct container *c, const struct model *m,
 {
 	struct field f[FIELDS_MAX];
 	struct err why = { 0 };
-	uint64_t *shots = NULL;
+	struct plain plain = { 0 };
+	int failed;
 
 	*s = (struct solution){ .bands = m->bands, .element_sides = 2 * m->elements,
 	                        .patch_sides = 2 * m->patches };
 	if (fields_size(c, "irradiance_direct", DT_F64, 3, 0, &s->groups, e) ||
 	    fields_size(c, "unshot_link", DT_F64, 3, 0, &s->links, e) ||
-	    fields_copy(c, f, solution_fields(s, &shots, f), e)) {
-		free(shots);
+	    fields_size(c, "shot", DT_F64, 3, 0, &s->rows, e))
 		return -1;
+	if (!(failed = fields_copy(c, f, solution_fields(s, &plain, f), e))) {
+		s->shots = *plain.shots;
+		memcpy(s->round, plain.round, sizeof s->round);
 	}
-	s->shots = *shots;
-	free(shots);
+	free(plain.shots);
+	free(plain.round);
+	if (failed)
+		return -1;
 	return solution_check(m, s, &why) ? container_refuse(c, e, "%s", why.text) : 0;
 }
 

@@ -45,13 +45,15 @@ int solution_check(const struct model *m, const struct solution *s, struct err *
 	       check_numbers("unshot_diffuse", s->unshot_diffuse, s->patch_sides * bands, 1,
 	                     e) ||
 	       check_numbers("unshot_link", s->unshot_link, 2 * s->links * bands, 1, e) ||
+	       check_numbers("shot", s->shot, 2 * s->rows * bands, 0, e) ||
+	       check_numbers("round", s->round, 2, 0, e) ||
 	       check_numbers("ledger", s->ledger, LEDGER_TERMS * bands, 1, e) ? -1 : 0;
 }
 
 void solution_free(struct solution *s)
 {
 	double *array[] = { s->direct, s->caustic, s->indirect, s->error, s->unshot_emission,
-		s->unshot_diffuse, s->unshot_link, s->ledger };
+		s->unshot_diffuse, s->unshot_link, s->shot, s->ledger };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);

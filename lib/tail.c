@@ -1,101 +1,143 @@
 /* A certified bound on what unshot flux can still do.
  *
- * q_k(side) = the largest fraction, over bands, of flux arriving on a patch-side
- * that is still in flight after k further arrivals. It falls with k, and unit flux
- * arrives at most sum_k max q_k = (q_0 + ... + q_{K-1}) / (1 - q_K) more times once
- * q_K < 1, as every K arrivals repeat the argument. With a = max albedo < 1 the
- * first term alone gives the familiar 1 / (1 - a). */
+ * q_k(side) = the fraction of flux becoming unshot on a patch-side's arrival that is
+ * unshot still after k further shots, for the worst way it can leave. It falls with
+ * k, and unit flux is shot at most (q_0 + ... + q_{K-1}) / (1 - q_K) times more, with
+ * the largest q over all sides, once q_K < 1, since every K shots repeat the
+ * argument. The first step alone gives the familiar 1 / (1 - a), a = the largest
+ * albedo. A shot arrives once at its first landing and once more after each ideal
+ * surface: the largest number of arrivals a row makes multiplies the bound. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "bsdf.h"
 #include "mem.h"
 #include "radiosity.h"
+#include "send.h"
 
 enum { STEPS = 64 };
 
 struct tail {
 	const struct transport *t;
-	double *row;          /* [rows] mean q of where a row's flux lands */
-	double *q;            /* [2P] */
+	size_t bands;
+	double *in;           /* [blocks][bands] flux by each block of unit flux, over its sum */
+	double *row;          /* [rows][bands] */
+	double *q;            /* [2P][bands] */
+	double arrivals;      /* largest of a row */
 };
 
-/* Ideal events keep flux inside a row: a bound on a row is its first landing's,
- * where light that goes on by a mirror counts in full. */
+static void unit_rows(struct tail *x, struct sender *sender)
+{
+	const struct transport *t = x->t;
+	double one[BANDS_MAX];
+
+	for (size_t k = 0; k < BANDS_MAX; k++)
+		one[k] = 1;
+	for (uint32_t r = 0; r < t->rows; r++) {
+		double *in = x->in + t->row_block[r] * x->bands, arrivals[BANDS_MAX] = { 0 };
+		send_block_flux(sender, r, one, in);
+		for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
+			for (size_t k = 0; k < x->bands; k++, in++) {
+				arrivals[k] += *in;
+				*in /= t->block[b].sum > 0 ? t->block[b].sum : 1;
+				x->arrivals = fmax(x->arrivals, arrivals[k]);
+			}
+	}
+}
+
 static void rows_step(struct tail *x)
 {
 	const struct transport *t = x->t;
 
-	for (uint32_t r = 0; r < t->rows; r++) {
-		uint64_t b = t->row_block[r];
-		double sum = 0;
-		for (uint64_t i = t->block[b].run; i < t->block[b + 1].run; i++)
-			sum += t->run[i].sum * x->q[t->run[i].target];
-		x->row[r] = t->block[b].sum > 0 ? sum / t->block[b].sum : 0;
-	}
+	for (uint32_t r = 0; r < t->rows; r++)
+		for (size_t k = 0; k < x->bands; k++) {
+			double sum = 0;
+			for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++) {
+				double in = x->in[b * x->bands + k];
+				for (uint64_t i = t->block[b].run; in > 0 && i < t->block[b + 1].run; i++)
+					sum += in * t->run[i].sum * x->q[t->run[i].target * x->bands + k];
+			}
+			x->row[r * x->bands + k] = sum;
+		}
 }
 
-static double side_step(const struct tail *x, uint32_t ps, int band)
+/* Of flux arriving on a side, what is unshot again times what its rows make of it. */
+static double side_step(const struct tail *x, uint32_t ps, size_t k)
 {
 	const struct transport *t = x->t;
 	const struct materials *mt = &t->m->material;
 	uint32_t material = model_patch_material(t->m, ps >> 1);
-	int side = (int)(ps & 1);
-	size_t at = material_at(mt, material, side) + (size_t)band;
+	size_t at = material_at(mt, material, (int)(ps & 1)) + k;
 	double q = 0, lobe[2] = { 0, 0 };
 
 	if (t->diffuse_row[ps] != FF_NO_ROW)
-		q += mt->rho_d[at] * x->row[t->diffuse_row[ps]];
+		q += mt->rho_d[at] * x->row[t->diffuse_row[ps] * x->bands + k];
 	if (t->diffuse_row[ps ^ 1] != FF_NO_ROW)
-		q += mt->tau_d[at] * x->row[t->diffuse_row[ps ^ 1]];
+		q += mt->tau_d[at] * x->row[t->diffuse_row[ps ^ 1] * x->bands + k];
 	for (uint64_t l = 2 * t->target_link[ps]; l < 2 * t->target_link[ps + 1]; l++)
 		if (t->link_row[l] != FF_NO_ROW)
-			lobe[l & 1] = fmax(lobe[l & 1], x->row[t->link_row[l]]);
-	for (int way = 0; way < 2; way++) {
-		double c = (way ? mt->tau_s : mt->rho_s)[at];
-		q += c * (bsdf_has_ideal(mt, material, side, way) ? 1 : lobe[way]);
-	}
-	return q;
+			lobe[l & 1] = fmax(lobe[l & 1], x->row[t->link_row[l] * x->bands + k]);
+	return q + mt->rho_s[at] * lobe[0] + mt->tau_s[at] * lobe[1];
 }
 
-static double sides_step(struct tail *x)
+static double albedo_shot(const struct transport *t, uint32_t ps, size_t k)
+{
+	const struct materials *mt = &t->m->material;
+	uint32_t material = model_patch_material(t->m, ps >> 1);
+	int side = (int)(ps & 1);
+	size_t at = material_at(mt, material, side) + k;
+
+	return mt->rho_d[at] + mt->tau_d[at] +
+	       (bsdf_has_lobe(mt, material, side, 0) ? mt->rho_s[at] : 0) +
+	       (bsdf_has_lobe(mt, material, side, 1) ? mt->tau_s[at] : 0);
+}
+
+/* One step for all sides; the largest q. */
+static double sides_step(struct tail *x, int first)
 {
 	const struct model *m = x->t->m;
 	double top = 0;
 
-	for (uint32_t ps = 0; ps < 2 * m->patches; ps++) {
-		double q = 0;
-		if (model_side_modelled(m, ps))
-			for (int k = 0; k < m->bands; k++)
-				q = fmax(q, side_step(x, ps, k));
-		x->q[ps] = q;
-		top = fmax(top, q);
-	}
+	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
+		for (size_t k = 0; k < x->bands; k++) {
+			double *q = &x->q[ps * x->bands + k];
+			*q = !model_side_modelled(m, ps) ? 0
+			   : first ? albedo_shot(x->t, ps, k) : side_step(x, ps, k);
+			top = fmax(top, *q);
+		}
 	return top;
+}
+
+static double series(struct tail *x)
+{
+	double sum = 1, top = sides_step(x, 1);
+
+	for (int k = 1; k < STEPS && top > .5; k++) {
+		sum += top;
+		rows_step(x);
+		top = sides_step(x, 0);
+	}
+	return top < 1 ? sum / (1 - top) * x->arrivals : INFINITY;
 }
 
 double radiosity_tail_bound(const struct transport *t)
 {
 	struct err e = { 0 };
-	struct tail x = { .t = t };
-	double sum = 1, top = 1;
+	struct sender sender;
+	size_t bands = (size_t)t->m->bands;
+	struct tail x = { .t = t, .bands = bands, .arrivals = 1 };
+	double bound = INFINITY;
 
-	x.row = mem_new(t->rows, sizeof *x.row, "bound", &e);
-	x.q = mem_new(2 * t->m->patches, sizeof *x.q, "bound", &e);
-	if (!x.row || !x.q) {
-		free(x.row);
-		free(x.q);
-		return INFINITY;
+	x.in = mem_new(t->blocks, bands * sizeof(double), "bound", &e);
+	x.row = mem_new(t->rows, bands * sizeof(double), "bound", &e);
+	x.q = mem_new(2 * t->m->patches, bands * sizeof(double), "bound", &e);
+	if (sender_init(&sender, t, &e) == 0 && x.in && x.row && x.q) {
+		unit_rows(&x, &sender);
+		bound = series(&x);
 	}
-	for (uint32_t ps = 0; ps < 2 * t->m->patches; ps++)
-		x.q[ps] = 1;
-	for (int k = 0; k < STEPS && top > .5; k++) {
-		rows_step(&x);
-		top = sides_step(&x);
-		if (top > .5)
-			sum += top;
-	}
+	sender_free(&sender);
+	free(x.in);
 	free(x.row);
 	free(x.q);
-	return top < 1 ? sum / (1 - top) : INFINITY;
+	return bound;
 }
