@@ -36,7 +36,7 @@ static const unsigned char *bytes_at(const struct gltf_reader *g, struct gltf_pl
 	return g->source.buffer[v->buffer].data + v->offset + at.offset;
 }
 
-struct gltf_elements gltf_elements(const struct gltf_reader *g, int accessor)
+struct gltf_elements gltf_access(const struct gltf_reader *g, int accessor)
 {
 	const struct gltf_accessor *a = &g->doc.accessor[accessor];
 	size_t size = gltf_element_size(a), stride = size;

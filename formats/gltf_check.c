@@ -113,7 +113,7 @@ static int check_sparse(const struct check *c, size_t i)
 	if (check_fit(c, i, ".sparse.indices", a->index, a->sparse, index_size, index_size) ||
 	    check_fit(c, i, ".sparse.values", a->value, a->sparse, size, size))
 		return -1;
-	struct gltf_elements v = gltf_elements(c->g, (int)i);
+	struct gltf_elements v = gltf_access(c->g, (int)i);
 	for (size_t k = 0; k < a->sparse; k++) {
 		uint32_t at = gltf_sparse_index(&v, k);
 		if (at >= a->count || (k && at <= gltf_sparse_index(&v, k - 1)))
@@ -171,7 +171,7 @@ static int check_finite(const struct check *c, int accessor, const char *name)
 
 	if (c->finite[accessor])
 		return 0;
-	struct gltf_elements v = gltf_elements(c->g, accessor);
+	struct gltf_elements v = gltf_access(c->g, accessor);
 	for (size_t i = 0; i < v.count; i++) {
 		gltf_element(&v, i, x);
 		for (int k = 0; k < v.n; k++)
@@ -221,7 +221,7 @@ static int check_indices(const struct check *c, struct where at, int accessor,
 		return err_set(c->e, "%s: meshes[%zu].primitives[%zu]: indices in accessors[%d] "
 		               "cannot have a byteStride; correct the file", c->path, at.mesh,
 		               at.primitive, accessor);
-	struct gltf_elements v = gltf_elements(c->g, accessor);
+	struct gltf_elements v = gltf_access(c->g, accessor);
 	for (size_t i = 0; i < v.count; i++)
 		if (gltf_index(&v, i) >= vertices)
 			return err_set(c->e, "%s: meshes[%zu].primitives[%zu]: index %u at position "

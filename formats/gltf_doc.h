@@ -174,7 +174,7 @@ struct gltf_elements {
 };
 size_t gltf_component_size(int component); /* 0 = no such type */
 size_t gltf_element_size(const struct gltf_accessor *a);
-struct gltf_elements gltf_elements(const struct gltf_reader *g, int accessor);
+struct gltf_elements gltf_access(const struct gltf_reader *g, int accessor);
 /* Element i as n numbers. O(log sparse). */
 void gltf_element(const struct gltf_elements *v, size_t i, double *out);
 /* Element i of an accessor of unsigned integers. */

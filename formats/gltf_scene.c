@@ -216,13 +216,13 @@ static int add_surface(struct scene *s, struct instance *i, int mesh, size_t pri
 	to->material[s->surface] = p->material == GLTF_NONE ? UINT32_MAX
 	                                                    : (uint32_t)p->material;
 	to->has_normals[s->surface] = p->normal != GLTF_NONE;
-	i->position = gltf_elements(g, p->position);
+	i->position = gltf_access(g, p->position);
 	if (p->normal != GLTF_NONE)
-		i->normal = gltf_elements(g, p->normal);
+		i->normal = gltf_access(g, p->normal);
 	if (p->uv != GLTF_NONE)
-		i->uv = gltf_elements(g, p->uv);
+		i->uv = gltf_access(g, p->uv);
 	if (p->indices != GLTF_NONE)
-		i->index = gltf_elements(g, p->indices);
+		i->index = gltf_access(g, p->indices);
 	for (size_t t = 0; t < n; t++)
 		if (add_triangle(s, i, t))
 			return -1;
