@@ -1,0 +1,487 @@
+/* trace: the view-dependent pass; pictures of a solved scene. */
+#include <fcntl.h>
+#include <getopt.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "../formats/cache.h"
+#include "../formats/camera_file.h"
+#include "../formats/digest.h"
+#include "../formats/exr_file.h"
+#include "../formats/history.h"
+#include "../formats/rad_file.h"
+#include "../lib/camera.h"
+#include "../lib/mem.h"
+#include "../lib/view.h"
+#include "common/cli.h"
+
+enum { OPT_EYE = 256, OPT_TARGET, OPT_UP, OPT_FOV, OPT_SAMPLES, OPT_LOBE_SAMPLES, OPT_DEPTH,
+       OPT_CUTOFF, OPT_HALF, OPT_COMPRESSION, OPT_LAYERS };
+
+static const struct cli_option option_table[] = {
+	{ 'c', "camera", "NAME", "camera to render; repeatable, or 'all'" },
+	{ 'o', "output", "FILE", "picture to write (EXR); %s stands for the camera's name" },
+	{ 's', "size", "WxH", "pixels (default: 640 wide, height from the camera's aspect)" },
+	{ OPT_EYE, "eye", "X,Y,Z", "render a view from this point" },
+	{ OPT_TARGET, "target", "X,Y,Z", "point it looks at" },
+	{ OPT_UP, "up", "X,Y,Z", "its upright direction (default: 0,1,0)" },
+	{ OPT_FOV, "fov", "DEGREES", "its vertical field of view (default: 50)" },
+	{ 'd', "diffuse", "METHOD", "where diffuse light comes from: mesh" },
+	{ OPT_SAMPLES, "samples", "N", "positions in each pixel (default: 4; 1: its centre)" },
+	{ OPT_LOBE_SAMPLES, "lobe-samples", "N",
+	  "rays into a finite lobe (default: 0: one, about its axis)" },
+	{ OPT_DEPTH, "depth", "N", "directional events that are followed (default: 32)" },
+	{ OPT_CUTOFF, "cutoff", "X", "cut tails that carry less than this part (default: 0.001)" },
+	{ OPT_LAYERS, "layers", "LIST",
+	  "also diffuse,directional,emission,Z,N,element,patch or all" },
+	{ OPT_HALF, "half", NULL, "colours as 16-bit floats" },
+	{ OPT_COMPRESSION, "compression", "METHOD", "zip (default), zips, piz, rle or none" },
+	{ 0, NULL, NULL, NULL }
+};
+
+/* A picture to be made. */
+struct shot {
+	const struct camera *camera;
+	struct view_frame frame;
+	char *path;
+	char key[33];
+	int done;
+};
+
+struct trace {
+	struct cli cli;
+	/* options */
+	const char *rad, *output;
+	const char **camera;        /* [cameras] names asked for */
+	int cameras, all;
+	int width, height;
+	const char *eye, *target, *up;
+	double fov;
+	struct view_options view;
+	struct exr_file_options exr;
+	/* the work */
+	char content[33];           /* digest of the .rad but for its cameras */
+	struct model cameras_of;    /* only cameras filled in */
+	struct camera ad_hoc;
+	struct shot *shot;
+	size_t shots;
+	struct model m;
+	struct solution s;
+	struct cache_info info;
+	struct reconstruction h;
+	struct ray_scene *rays;
+	struct view_scene *scene;
+	char *history;
+	FILE *results;              /* stderr when the picture goes to stdout */
+};
+
+/* ---- options ---- */
+
+static void vector(const struct cli *c, const char *option, const char *text, double v[3])
+{
+	char extra;
+
+	if (sscanf(text, "%lf,%lf,%lf%c", &v[0], &v[1], &v[2], &extra) != 3 ||
+	    !isfinite(v[0] + v[1] + v[2]))
+		cli_usage(c, "%s: '%s' is not three numbers X,Y,Z", option, text);
+}
+
+static void diffuse_method(const struct cli *c, const char *text)
+{
+	if (strcmp(text, "direct") == 0 || strcmp(text, "gather") == 0)
+		cli_usage(c, "--diffuse: %s is not available in this version; use mesh", text);
+	if (strcmp(text, "mesh") != 0)
+		cli_usage(c, "--diffuse: there is no method '%s'; use mesh", text);
+}
+
+static void compression(struct trace *t, const char *text)
+{
+	int method = exr_file_compression_by_name(text);
+
+	if (method < 0)
+		cli_usage(&t->cli, "--compression: '%s' is none of zip, zips, piz, rle, none", text);
+	t->exr.compression = (enum exr_file_compression)method;
+}
+
+static void take_camera(struct trace *t, const char *name)
+{
+	if (strcmp(name, "all") == 0)
+		t->all = 1;
+	else
+		t->camera[t->cameras++] = name;
+}
+
+static void take_option(struct trace *t, int letter)
+{
+	const struct cli *c = &t->cli;
+
+	switch (letter) {
+	case 'c': take_camera(t, optarg); break;
+	case 'o': t->output = optarg; break;
+	case 's':
+		if (camera_parse_size(optarg, &t->width, &t->height))
+			cli_usage(c, "--size: '%s' is not a size such as 640x480", optarg);
+		break;
+	case 'd': diffuse_method(c, optarg); break;
+	case OPT_EYE: t->eye = optarg; break;
+	case OPT_TARGET: t->target = optarg; break;
+	case OPT_UP: t->up = optarg; break;
+	case OPT_FOV: t->fov = cli_number(c, "--fov", optarg, 1e-3, 179.9); break;
+	case OPT_SAMPLES:
+		t->view.samples = (int)cli_integer(c, "--samples", optarg, 1, 1 << 16);
+		break;
+	case OPT_LOBE_SAMPLES:
+		t->view.lobe_samples = (int)cli_integer(c, "--lobe-samples", optarg, 0, 1 << 16);
+		break;
+	case OPT_DEPTH:
+		t->view.depth = (int)cli_integer(c, "--depth", optarg, 0, 100000);
+		break;
+	case OPT_CUTOFF: t->view.cutoff = cli_number(c, "--cutoff", optarg, 0, 1); break;
+	case OPT_HALF: t->exr.half = 1; break;
+	case OPT_COMPRESSION: compression(t, optarg); break;
+	case OPT_LAYERS:
+		if (view_parse_layers(optarg, &t->view.layers))
+			cli_usage(c, "--layers: '%s' is not a list of diffuse, directional, emission, "
+			          "Z, N, element, patch or all", optarg);
+		break;
+	}
+}
+
+static void parse(struct trace *t, int argc, char **argv)
+{
+	const struct cli *c = &t->cli;
+	int letter;
+
+	while ((letter = cli_next(&t->cli, argc, argv)) != -1)
+		take_option(t, letter);
+	if (argc - optind != 1)
+		cli_usage(c, argc == optind ? "a .rad file is needed" : "one .rad file at a time");
+	t->rad = argv[optind];
+	if (!t->output)
+		cli_usage(c, "-o is needed: the picture to write");
+	if (!t->eye != !t->target)
+		cli_usage(c, "--eye and --target go together");
+	if (!t->eye && (t->up || t->fov > 0))
+		cli_usage(c, "--up and --fov belong to a view by --eye and --target");
+	t->view.threads = t->cli.threads;
+	t->results = strcmp(t->output, "-") == 0 ? stderr : stdout;
+}
+
+/* ---- what is to be made ---- */
+
+static int ad_hoc_camera(struct trace *t, struct err *e)
+{
+	double eye[3], target[3], up[3] = { 0, 1, 0 }, other[3] = { 0, 0, -1 };
+	double fov = t->fov > 0 ? t->fov : 50;
+	struct err steep = { 0 };
+
+	vector(&t->cli, "--eye", t->eye, eye);
+	vector(&t->cli, "--target", t->target, target);
+	if (t->up)
+		vector(&t->cli, "--up", t->up, up);
+	/* Straight up or down, -Z takes the place of the default Y. */
+	if (camera_look_at(eye, target, up, fov, &t->ad_hoc, t->up ? e : &steep) &&
+	    (t->up || camera_look_at(eye, target, other, fov, &t->ad_hoc, e)))
+		return -1;
+	t->ad_hoc.name = mem_new(1, sizeof "view", "name", e);
+	return t->ad_hoc.name ? (void)strcpy(t->ad_hoc.name, "view"), 0 : -1;
+}
+
+/* The output with each %s replaced by the name; slashes in it become underscores. */
+static char *output_path(const char *pattern, const char *name, struct err *e)
+{
+	size_t uses = 0, n = strlen(name);
+
+	for (const char *p = pattern; (p = strstr(p, "%s")); p += 2)
+		uses++;
+	char *path = mem_new(strlen(pattern) + uses * n + 1, 1, "path", e), *out = path;
+	while (path && *pattern) {
+		if (strncmp(pattern, "%s", 2) != 0) {
+			*out++ = *pattern++;
+			continue;
+		}
+		for (size_t i = 0; i < n; i++)
+			*out++ = name[i] == '/' ? '_' : name[i];
+		pattern += 2;
+	}
+	return path;
+}
+
+/* Everything that decides a picture's contents. */
+static void picture_key(const struct trace *t, struct shot *s)
+{
+	const struct view_options *v = &t->view;
+	const double number[] = { s->frame.width, s->frame.height, v->samples, v->lobe_samples,
+		v->depth, v->cutoff, v->layers, t->exr.compression, t->exr.half };
+	char camera[33];
+	struct digest *d = digest_new();
+
+	cache_camera_id(s->camera, camera);
+	digest_string(d, "twopass.exr " TWOPASS_VERSION);
+	digest_string(d, t->content);
+	digest_string(d, camera);
+	digest_bytes(d, number, sizeof number);
+	digest_end(d, s->key);
+}
+
+static int add_shot(struct trace *t, const struct camera *c, struct err *e)
+{
+	struct shot *s = &t->shot[t->shots++];
+
+	s->camera = c;
+	s->path = output_path(t->output, c->name, e);
+	if (!s->path || camera_frame(c, t->width, t->height, &s->frame, e))
+		return -1;
+	for (const struct shot *p = t->shot; p < s; p++)
+		if (strcmp(p->path, s->path) == 0)
+			return err_set(e, "%s: cameras '%s' and '%s' would both be written there; "
+			               "put %%s into -o", s->path, p->camera->name, c->name);
+	picture_key(t, s);
+	return 0;
+}
+
+static int list_shots(struct trace *t, struct err *e)
+{
+	const struct model *m = &t->cameras_of;
+
+	t->shot = mem_new(m->cameras + (size_t)t->cameras + 1, sizeof *t->shot, "views", e);
+	if (!t->shot || (t->eye && (ad_hoc_camera(t, e) || add_shot(t, &t->ad_hoc, e))))
+		return -1;
+	if (t->all && m->cameras == 0)
+		return err_set(e, "%s: has no cameras; give a view by --eye and --target", t->rad);
+	/* A scene's only camera need not be named. */
+	if (!t->eye && !t->all && t->cameras == 0 && m->cameras == 1)
+		t->all = 1;
+	for (size_t i = 0; i < m->cameras && t->all; i++)
+		if (add_shot(t, &m->camera[i], e))
+			return -1;
+	for (int i = 0; i < t->cameras && !t->all; i++) {
+		struct err why = { 0 };
+		int k = camera_find(m, t->camera[i], &why);
+		if (k < 0)
+			return err_set(e, "%s: %s", t->rad, why.text);
+		if (add_shot(t, &m->camera[k], e))
+			return -1;
+	}
+	if (t->shots == 0) {
+		struct err why = { 0 };
+		camera_find(m, "", &why);
+		return err_set(e, "%s: a camera is needed (-c); %s", t->rad, why.text);
+	}
+	return 0;
+}
+
+/* Reads what the header and the cameras say, and decides what has to be done. */
+static int plan(struct trace *t, struct err *e)
+{
+	struct container *c = container_open(t->rad, "twopass.rad", e);
+	int bad = c ? camera_file_get(c, &t->cameras_of, e) : -1;
+
+	if (!bad)
+		container_digest(c, t->content);
+	container_close(c);
+	return bad ? -1 : list_shots(t, e);
+}
+
+/* 1 if the picture is there with the same key; it is then touched. */
+static int up_to_date(const struct shot *s)
+{
+	struct exr_file_info info = { 0 };
+	struct err ignored = { 0 };
+	struct stat st;
+
+	if (strcmp(s->path, "-") == 0 || stat(s->path, &st) || !S_ISREG(st.st_mode) ||
+	    exr_file_read_info(s->path, &info, &ignored))
+		return 0;
+	const char *key = exr_file_info_get(&info, EXR_FILE_KEY);
+	int same = key && strcmp(key, s->key) == 0;
+	exr_file_info_free(&info);
+	return same && utimensat(AT_FDCWD, s->path, NULL, 0) == 0;
+}
+
+/* Better now than after the work. */
+static int check_directory(const char *path, struct err *e)
+{
+	const char *slash = strrchr(path, '/');
+	char *directory;
+	int bad = 0;
+
+	if (!slash || slash == path)
+		return 0;
+	if (!(directory = mem_new((size_t)(slash - path) + 1, 1, "path", e)))
+		return -1;
+	memcpy(directory, path, (size_t)(slash - path));
+	if (access(directory, W_OK | X_OK))
+		bad = err_set(e, "%s: cannot write into directory %s; create it or choose another",
+		              path, directory);
+	free(directory);
+	return bad;
+}
+
+/* ---- the work ---- */
+
+static int read_scene(struct trace *t, int argc, char **argv, struct err *e)
+{
+	double begun = cli_seconds();
+
+	if (rad_file_read(t->rad, &t->m, &t->s, &t->info, e))
+		return -1;
+	t->history = history_append(t->info.history, argc, argv, e);
+	double read = cli_seconds();
+	t->rays = ray_scene_new(&t->m, e);
+	if (!t->history || !t->rays)
+		return -1;
+	double built = cli_seconds();
+	if (reconstruct(&t->m, &t->s, t->view.threads, &t->h, e))
+		return -1;
+	t->scene = view_scene_new(&t->m, t->rays, &t->h, e);
+	double ready = cli_seconds();
+	if (t->scene && !t->cli.quiet)
+		fprintf(t->results, "%s: %zu triangles, %zu elements, %d band%s; read in %.3f s, "
+		        "ray structure in %.3f s, interpolation in %.3f s\n", t->rad,
+		        t->m.triangles, t->m.elements, t->m.bands, t->m.bands == 1 ? "" : "s",
+		        read - begun, built - read, ready - built);
+	return t->scene ? 0 : -1;
+}
+
+/* The bound on what is missing, relative to the picture's mean radiance. */
+static void cut_text(const struct view_stats *s, char *text, size_t size)
+{
+	if (s->cut == 0)
+		snprintf(text, size, "nothing cut");
+	else if (isfinite(s->cut) && s->radiance > 0)
+		snprintf(text, size, "cut tails hold at most %.2g of the mean radiance",
+		         s->cut / s->radiance);
+	else
+		snprintf(text, size, "cut tails have no finite bound");
+}
+
+static int describe(const struct trace *t, const struct shot *s, const struct view_stats *v,
+                    struct exr_file_info *info, struct err *e)
+{
+	char statistics[256], cut[48] = "null";
+
+	if (isfinite(v->cut))
+		snprintf(cut, sizeof cut, "%.9g", v->cut);
+	snprintf(statistics, sizeof statistics,
+	         "{\"samples\": %d, \"rays\": %" PRIu64 ", \"mean_radiance\": %.9g, "
+	         "\"cut_bound\": %s}", t->view.samples, v->rays, v->radiance, cut);
+	info->white_luminance = 1;
+	info->has_world_to_camera = 1;
+	camera_world_to_camera(&s->frame, info->world_to_camera);
+	return exr_file_info_set(info, EXR_FILE_CAMERA, s->camera->name, e) ||
+	       exr_file_info_set(info, EXR_FILE_HISTORY, t->history, e) ||
+	       exr_file_info_set(info, EXR_FILE_KEY, s->key, e) ||
+	       exr_file_info_set(info, "statistics", statistics, e) ? -1 : 0;
+}
+
+static int write_picture(const struct trace *t, const struct shot *s,
+                         const struct view_stats *v, const struct image *im, struct err *e)
+{
+	struct exr_file_info info = { 0 };
+	size_t clipped = 0;
+	int bad = describe(t, s, v, &info, e) ||
+	          exr_file_write(s->path, im, &info, &t->exr, &clipped, e);
+
+	exr_file_info_free(&info);
+	if (!bad && clipped)
+		cli_warn(&t->cli, "%s: %zu values beyond the range of --half were clipped", s->path,
+		         clipped);
+	return bad ? -1 : 0;
+}
+
+static int render(const struct trace *t, const struct shot *s, struct err *e)
+{
+	struct view_stats v = { 0 };
+	struct image im = { 0 };
+	struct cli_progress bar;
+	char cut[96];
+	double begun = cli_seconds();
+	struct progress progress = cli_progress_begin(&bar, &t->cli, s->camera->name);
+	int bad = view_render(t->scene, &s->frame, &t->view, &progress, &im, &v, e);
+
+	cli_progress_end(&bar);
+	double seconds = cli_seconds() - begun;
+	bad = bad || write_picture(t, s, &v, &im, e);
+	double writing = cli_seconds() - begun - seconds;
+	image_free(&im);
+	if (bad)
+		return -1;
+	cut_text(&v, cut, sizeof cut);
+	if (!t->cli.quiet)
+		fprintf(t->results, "%s: %s, %d x %d, %" PRIu64 " rays in %.3f s (%.2f Mray/s), "
+		        "written in %.3f s; %s\n", s->path, s->camera->name, s->frame.width,
+		        s->frame.height, v.rays, seconds, (double)v.rays / seconds / 1e6, writing,
+		        cut);
+	return 0;
+}
+
+static int run(struct trace *t, int argc, char **argv, struct err *e)
+{
+	size_t left = 0;
+
+	if (plan(t, e))
+		return -1;
+	for (struct shot *s = t->shot; s < t->shot + t->shots; s++) {
+		s->done = up_to_date(s);
+		left += !s->done;
+		if (s->done)
+			cli_note(&t->cli, "%s: up to date", s->path);
+		else if (check_directory(s->path, e))
+			return -1;
+	}
+	if (left == 0)
+		return 0;
+	if (read_scene(t, argc, argv, e))
+		return -1;
+	for (const struct shot *s = t->shot; s < t->shot + t->shots; s++)
+		if (!s->done && render(t, s, e))
+			return -1;
+	if (!t->cli.quiet)
+		fprintf(t->results, "peak memory %.0f MB\n", cli_peak_megabytes());
+	return 0;
+}
+
+static void release(struct trace *t)
+{
+	for (size_t i = 0; i < t->shots; i++)
+		free(t->shot[i].path);
+	free(t->shot);
+	free(t->camera);
+	free(t->ad_hoc.name);
+	free(t->history);
+	view_scene_free(t->scene);
+	ray_scene_free(t->rays);
+	reconstruction_free(&t->h);
+	solution_free(&t->s);
+	model_free(&t->m);
+	model_free(&t->cameras_of);
+	cache_info_free(&t->info);
+}
+
+int main(int argc, char **argv)
+{
+	struct trace t = {
+		.cli = { .program = "trace", .synopsis = "[options] FILE.rad -o PICTURE.exr",
+		         .about = "Render views of a solved scene, following mirrors and panes.",
+		         .options = option_table, .uses_threads = 1 },
+		.view = { .samples = 4, .depth = 32, .cutoff = 1e-3 }
+	};
+	struct err e = { 0 };
+	int status = 0;
+
+	cli_signals();
+	t.camera = mem_new((size_t)argc, sizeof *t.camera, "camera names", &e);
+	if (!t.camera)
+		return cli_fail(&t.cli, &e);
+	parse(&t, argc, argv);
+	if (run(&t, argc, argv, &e))
+		status = cli_fail(&t.cli, &e);
+	release(&t);
+	return cli_finish(&t.cli, status);
+}
