@@ -181,7 +181,7 @@ static void test_chi_square_of_lobes(void **state)
 	(void)state;
 	for (int kind = LOBE_PAPER; kind <= LOBE_RECIPROCAL; kind++) {
 		struct model m;
-		begin(&m, 1, kind);
+		begin(&m, 1, (enum lobe_kind)kind);
 		for (size_t i = 0; i < COUNT(k) * COUNT(degrees) * 4; i++) {
 			struct lobe_case c = { .m = &m, .k = k[i / 20], .transmitted = i & 1,
 				.transport = i & 2 ? BSDF_FROM_EYE : BSDF_FROM_LIGHT };
@@ -370,7 +370,7 @@ static void test_mixed_materials(void **state)
 	for (int kind = LOBE_PAPER; kind <= LOBE_RECIPROCAL; kind++)
 		for (int ideal = 0; ideal < 2; ideal++) {
 			struct model m;
-			mixed_material(&m, kind, ideal);
+			mixed_material(&m, (enum lobe_kind)kind, ideal);
 			for (size_t i = 0; i < COUNT(degrees); i++) {
 				check_mixed(&m, degrees[i], BSDF_FROM_LIGHT, seed++);
 				check_mixed(&m, degrees[i], BSDF_FROM_EYE, seed++);
@@ -559,7 +559,7 @@ static void check_grazing(const struct model *m, const double known[3], const do
 			struct bsdf_sample s;
 			double u[3], f[3];
 			draw_three(r, u);
-			bsdf_sample(m, 0, up, known, t, u, &s);
+			bsdf_sample(m, 0, up, known, (enum bsdf_transport)t, u, &s);
 			assert_true(isfinite(s.pdf) && s.pdf >= 0);
 			for (int b = 0; b < 3; b++)
 				assert_true(isfinite(s.weight[b]) && s.weight[b] >= 0);
@@ -580,7 +580,7 @@ static void test_grazing(void **state)
 	for (int kind = LOBE_PAPER; kind <= LOBE_RECIPROCAL; kind++)
 		for (double k = 0; k <= 1e8; k = 20 * k + .5) {
 			struct model m;
-			mixed_material(&m, kind, 0);
+			mixed_material(&m, (enum lobe_kind)kind, 0);
 			for (int s = 0; s < 2; s++)
 				m.material.alpha[s] = m.material.beta[s] = k;
 			for (size_t i = 0; i < COUNT(height); i++) {
