@@ -1,0 +1,173 @@
+/* Differences of pictures, against sums done by hand. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "../../lib/compare.h"
+
+static const char *const names[] = { "R", "G", "B" };
+static const int rgb[3] = { 0, 1, 2 }, red[1] = { 0 };
+
+static void two_images(struct image *a, struct image *b)
+{
+	struct err e = { 0 };
+
+	assert_int_equal(image_new(a, 4, 2, 3, names, &e), 0);
+	assert_int_equal(image_new(b, 4, 2, 3, names, &e), 0);
+}
+
+static void near(double got, double expected)
+{
+	if (!(fabs(got - expected) <= 1e-14 * fabs(expected)))
+		fail_msg("%.17g is not %.17g", got, expected);
+}
+
+static void test_equal(void **state)
+{
+	struct image a, b;
+	struct compare d;
+
+	(void)state;
+	two_images(&a, &b);
+	compare_channels(&a, rgb, &b, rgb, 3, &d);
+	assert_int_equal(d.pixels, 8);
+	assert_true(d.rmse == 0 && d.relative_rmse == 0 && d.bias == 0 && d.relative_bias == 0);
+	assert_true(d.max == 0 && d.max_x == 0 && d.max_y == 0);
+	image_free(&a);
+	image_free(&b);
+}
+
+static void test_numbers(void **state)
+{
+	struct image a, b;
+	struct compare d;
+
+	(void)state;
+	two_images(&a, &b);
+	for (int i = 0; i < 24; i++)
+		b.pixel[i] = 2;
+	for (int i = 0; i < 24; i++)
+		a.pixel[i] = i == 6 ? 5.f : i == 8 + 6 ? -2.f : 2.f;
+	compare_channels(&a, red, &b, red, 1, &d);
+	near(d.mean_a, 19. / 8);
+	near(d.mean_b, 2);
+	near(d.bias, 3. / 8);
+	near(d.relative_bias, 3. / 16);
+	near(d.rmse, sqrt(9. / 8));
+	near(d.relative_rmse, sqrt(9. / 8) / 2);
+	compare_channels(&a, rgb, &b, rgb, 3, &d);
+	near(d.rmse, sqrt(25. / 24));
+	near(d.bias, -1. / 24);
+	near(d.max, 4);
+	assert_int_equal(d.max_x, 2);
+	assert_int_equal(d.max_y, 1);
+	image_free(&a);
+	image_free(&b);
+}
+
+static void test_not_finite(void **state)
+{
+	struct image a, b;
+	struct compare d;
+
+	(void)state;
+	two_images(&a, &b);
+	a.pixel[0] = NAN;
+	b.pixel[8 + 1] = INFINITY;
+	compare_channels(&a, rgb, &b, rgb, 3, &d);
+	assert_int_equal(d.pixels, 6);
+	assert_int_equal(d.left_out, 2);
+	compare_channels(&a, red, &b, red, 1, &d);
+	assert_int_equal(d.pixels, 7);
+	for (int i = 0; i < 8; i++)
+		a.pixel[i] = -INFINITY;
+	compare_channels(&a, rgb, &b, rgb, 3, &d);
+	assert_int_equal(d.pixels, 0);
+	assert_int_equal(d.left_out, 8);
+	assert_true(d.rmse == 0 && d.max_x == -1);
+	image_free(&a);
+	image_free(&b);
+}
+
+static void test_black_yardstick(void **state)
+{
+	struct image a, b;
+	struct compare d;
+
+	(void)state;
+	two_images(&a, &b);
+	a.pixel[3] = -1;
+	compare_channels(&a, rgb, &b, rgb, 3, &d);
+	assert_true(isinf(d.relative_rmse) && d.relative_rmse > 0);
+	assert_true(isinf(d.relative_bias) && d.relative_bias < 0);
+	image_free(&a);
+	image_free(&b);
+}
+
+static void test_difference(void **state)
+{
+	struct image a, b, c;
+	struct err e = { 0 };
+	const int green[1] = { 1 };
+
+	(void)state;
+	two_images(&a, &b);
+	a.pixel[8 + 5] = 3;
+	b.pixel[8 + 5] = 4.5f;
+	assert_int_equal(compare_difference(&a, green, &b, green, 1, &c, &e), 0);
+	assert_int_equal(c.channels, 1);
+	assert_string_equal(c.name[0], "G");
+	assert_true(c.pixel[5] == -1.5f && c.pixel[4] == 0);
+	image_free(&a);
+	image_free(&b);
+	image_free(&c);
+}
+
+static void test_layers(void **state)
+{
+	static const char *const many[] = { "Z", "diffuse.B", "diffuse.G", "diffuse.R", "N.X",
+		                            "N.Y", "N.Z", "half.R" };
+	struct image im;
+	struct err e = { 0 };
+	int c[3];
+
+	(void)state;
+	assert_int_equal(image_new(&im, 1, 1, 8, many, &e), 0);
+	assert_int_equal(image_layer(&im, "diffuse", c), 3);
+	assert_true(c[0] == 3 && c[1] == 2 && c[2] == 1);
+	assert_int_equal(image_layer(&im, "N", c), 3);
+	assert_int_equal(image_layer(&im, "Z", c), 1);
+	assert_true(c[0] == 0 && c[2] == 0);
+	assert_int_equal(image_layer(&im, "half", c), 0);
+	assert_int_equal(image_layer(&im, "half.R", c), 1);
+	assert_int_equal(image_layer(&im, NULL, c), 0);
+	image_free(&im);
+}
+
+static void test_empty_image(void **state)
+{
+	struct image im;
+	struct err e = { 0 }, f = { 0 };
+
+	(void)state;
+	assert_int_equal(image_new(&im, 0, 5, 3, names, &e), -1);
+	assert_int_equal(image_new(&im, 0x7fffffff, 0x7fffffff, 3, names, &f), -1);
+	assert_null(im.pixel);
+	image_free(&im);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_equal),           cmocka_unit_test(test_numbers),
+		cmocka_unit_test(test_not_finite),      cmocka_unit_test(test_black_yardstick),
+		cmocka_unit_test(test_difference),      cmocka_unit_test(test_layers),
+		cmocka_unit_test(test_empty_image),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
