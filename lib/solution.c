@@ -50,6 +50,20 @@ int solution_check(const struct model *m, const struct solution *s, struct err *
 	       check_numbers("ledger", s->ledger, LEDGER_TERMS * bands, 1, e) ? -1 : 0;
 }
 
+double solution_mean_error(const struct model *m, const struct solution *s)
+{
+	size_t bands = (size_t)s->bands;
+	double error = 0, all = 0;
+
+	for (size_t es = 0; es < s->element_sides; es++)
+		for (size_t k = 0; k < bands; k++) {
+			double area = m->element_area[es >> 1];
+			error += area * s->error[es * bands + k];
+			all += area * solution_irradiance(s, es, (int)k);
+		}
+	return all > 0 ? error / all : 0;
+}
+
 void solution_free(struct solution *s)
 {
 	double *array[] = { s->direct, s->caustic, s->indirect, s->error, s->unshot_emission,

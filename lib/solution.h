@@ -55,6 +55,10 @@ double solution_exitance(const struct model *m, const struct solution *s,
  * and e with "array NAME: what is wrong". O(element sides x bands). */
 int solution_check(const struct model *m, const struct solution *s, struct err *e);
 
+/* Area-weighted mean standard error of irradiance over the mean irradiance of the
+ * modelled sides; 0 in the dark. */
+double solution_mean_error(const struct model *m, const struct solution *s);
+
 void solution_free(struct solution *s);
 
 #endif

@@ -1,0 +1,222 @@
+/* ffcalc: form factors, diffuse and directional, of a mesh. */
+#include <getopt.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "../formats/digest.h"
+#include "../formats/ff_file.h"
+#include "../formats/history.h"
+#include "../formats/mesh_file.h"
+#include "../lib/ff_build.h"
+#include "common/cli.h"
+
+enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GAIN };
+
+static const struct cli_option options[] = {
+	{ 'o', "output", "FILE", "write the form factors to FILE (.ff)" },
+	{ 'm', "method", "METHOD", "rays or hemicube (default rays)" },
+	{ 'n', "samples", "N", "rays a patch-side (default 4096), or pixels along a hemicube's edge (64)" },
+	{ 'p', "points", "N", "hemicubes a patch-side (default 16)" },
+	{ OPT_GAIN, "emitter-gain", "N", "times as many rays for emitters (default 8)" },
+	{ OPT_LOBE_RAYS, "lobe-rays", "N", "rays a patch-side for each directional lobe (default 4096)" },
+	{ OPT_DEPTH, "depth", "N", "longest chain of ideal mirrors and panes (default 256)" },
+	{ OPT_PRECISION, "precision", "TYPE", "f32 or f64 (default f32)" },
+	{ OPT_PART, "part", "K/N", "compute the K-th of N shards only" },
+	{ OPT_SEED, "seed", "N", "seed of the sample points (default 1)" },
+	{ 0, NULL, NULL, NULL }
+};
+
+struct request {
+	const char *mesh, *output;
+	struct ff_options ff;
+};
+
+static void parse_part(const struct cli *c, const char *text, struct ff_options *o)
+{
+	unsigned k, n;
+	char end;
+
+	if (sscanf(text, "%u/%u%c", &k, &n, &end) != 2 || k < 1 || k > n || n > 1000000)
+		cli_usage(c, "--part %s: a shard is K/N with 1 <= K <= N, such as 2/4", text);
+	o->part = k;
+	o->parts = n;
+}
+
+static void parse_word(const struct cli *c, const char *option, const char *text,
+                       const char *yes, const char *no, int *value)
+{
+	if (strcmp(text, yes) && strcmp(text, no))
+		cli_usage(c, "%s %s: must be %s or %s", option, text, no, yes);
+	*value = strcmp(text, yes) == 0;
+}
+
+static void parse(struct cli *c, int argc, char **argv, struct request *r)
+{
+	int letter, hemicube = 0;
+	long n = 0;
+	struct ff_options *o = &r->ff;
+
+	*o = (struct ff_options){ .points = 16, .emitter_gain = 8, .lobe_rays = 4096, .depth = 256,
+	                          .seed = 1, .part = 1, .parts = 1 };
+	while ((letter = cli_next(c, argc, argv)) != -1) {
+		switch (letter) {
+		case 'o': r->output = optarg; break;
+		case 'm': parse_word(c, "--method", optarg, "hemicube", "rays", &hemicube); break;
+		case 'n': n = cli_integer(c, "--samples", optarg, 4, 1 << 26); break;
+		case 'p': o->points = (uint32_t)cli_integer(c, "--points", optarg, 1, 4096); break;
+		case OPT_GAIN: o->emitter_gain = (uint32_t)cli_integer(c, "--emitter-gain", optarg, 1, 4096); break;
+		case OPT_LOBE_RAYS: o->lobe_rays = (uint32_t)cli_integer(c, "--lobe-rays", optarg, 1, 1 << 26); break;
+		case OPT_DEPTH: o->depth = (uint32_t)cli_integer(c, "--depth", optarg, 0, 1000000); break;
+		case OPT_PRECISION: parse_word(c, "--precision", optarg, "f64", "f32", &o->f64); break;
+		case OPT_PART: parse_part(c, optarg, o); break;
+		case OPT_SEED: o->seed = (uint64_t)cli_integer(c, "--seed", optarg, 0, 0x7fffffffffffffff); break;
+		}
+	}
+	if (argc - optind != 1)
+		cli_usage(c, "one .mesh file is needed");
+	if (!r->output)
+		cli_usage(c, "an output is needed: -o FILE.ff");
+	r->mesh = argv[optind];
+	o->method = hemicube ? FF_HEMICUBE : FF_RAYS;
+	o->rays = n ? (uint32_t)n : hemicube ? 64 : 4096;
+	if (hemicube && (o->rays % 2 || o->rays > 8192))
+		cli_usage(c, "--samples %u: a hemicube's resolution is even and at most 8192", o->rays);
+	if (!hemicube)
+		o->rays = (o->rays + 3) / 4 * 4;
+	o->threads = c->threads;
+}
+
+static json_t *options_json(const struct ff_options *o)
+{
+	json_t *j = json_pack("{s:s, s:I, s:I, s:I, s:I, s:s, s:I, s:I}",
+		"method", o->method == FF_HEMICUBE ? "hemicube" : "rays",
+		"samples", (json_int_t)o->rays, "lobe_rays", (json_int_t)o->lobe_rays,
+		"depth", (json_int_t)o->depth, "seed", (json_int_t)o->seed,
+		"precision", o->f64 ? "f64" : "f32",
+		"part", (json_int_t)o->part, "parts", (json_int_t)o->parts);
+
+	if (o->method == FF_HEMICUBE)
+		json_object_set_new(j, "points", json_integer(o->points));
+	else
+		json_object_set_new(j, "emitter_gain", json_integer(o->emitter_gain));
+	return j;
+}
+
+static json_t *report_json(const struct ff_stats *s)
+{
+	return json_pack("{s:{s:I, s:I, s:I, s:I}, s:I, s:I, s:I, s:f, s:f, s:f, s:f, s:f, s:f}",
+		"rows", "diffuse", (json_int_t)s->rows[FF_DIFFUSE],
+		"emission", (json_int_t)s->rows[FF_EMISSION],
+		"reflected", (json_int_t)s->rows[FF_REFLECTED],
+		"transmitted", (json_int_t)s->rows[FF_TRANSMITTED],
+		"links", (json_int_t)s->links, "blocks", (json_int_t)s->blocks,
+		"entries", (json_int_t)s->entries, "rays", s->rays, "samples", s->samples,
+		"worst_residual", s->worst_residual, "mean_row_error", s->mean_error,
+		"worst_row_error", s->worst_error, "largest_cut", s->cut);
+}
+
+/* Everything the output depends on, so that an equal one need not be made again. */
+static void make_key(const struct cache_info *mesh, const char *chosen, char key[33])
+{
+	struct digest *d = digest_new();
+
+	digest_string(d, "ffcalc " TWOPASS_VERSION);
+	digest_string(d, mesh->geometry_id);
+	digest_string(d, chosen);
+	digest_end(d, key);
+}
+
+static int put(void *arg, const struct ff *batch, struct err *e)
+{
+	return ff_file_append(arg, batch, e);
+}
+
+static void print_report(const struct ff_stats *s, const struct request *r, double seconds)
+{
+	printf("rows          %zu diffuse, %zu emission lobes, %zu reflected, %zu transmitted\n",
+	       s->rows[FF_DIFFUSE], s->rows[FF_EMISSION], s->rows[FF_REFLECTED],
+	       s->rows[FF_TRANSMITTED]);
+	printf("links         %zu\n", s->links);
+	printf("entries       %zu in %zu blocks\n", s->entries, s->blocks);
+	printf("rays          %.0f (%.2f Mray/s)\n", s->rays, s->rays / seconds * 1e-6);
+	if (r->ff.method == FF_HEMICUBE)
+		printf("pixels        %.0f (%.2f Mpixel/s)\n", s->samples, s->samples / seconds * 1e-6);
+	printf("row sums      within %.3g of 1 before scaling\n", s->worst_residual);
+	printf("row error     %.3g mean, %.3g worst (standard error, root of squares over receivers)\n",
+	       s->mean_error, s->worst_error);
+	if (s->cut > 0)
+		printf("cut           at most %.3g of a row, by --depth %u\n", s->cut, r->ff.depth);
+	printf("seconds       %.3f\n", seconds);
+	printf("peak memory   %.0f MB\n", cli_peak_megabytes());
+}
+
+static int compute(struct cli *c, const struct request *r, const struct model *m,
+                   struct cache_info *info, struct err *e)
+{
+	struct ff_writer *w = ff_file_create(r->output, m, r->ff.f64, e);
+	struct ff_sink sink = { put, w };
+	struct ff_stats stats;
+	struct ff whole = { 0 };
+	struct cli_progress bar;
+	double begun = cli_seconds();
+
+	if (!w)
+		return -1;
+	struct progress progress = cli_progress_begin(&bar, c, "form factors");
+	int bad = ff_build(m, &r->ff, &whole, &stats, &sink, &progress, e);
+	cli_progress_end(&bar);
+	if (bad) {
+		ff_file_abandon(w);
+	} else {
+		json_t *report = report_json(&stats);
+		info->report = json_dumps(report, JSON_COMPACT);
+		json_decref(report);
+		bad = ff_file_finish(w, &whole, info, e);
+	}
+	ff_free(&whole);
+	if (!bad && !c->quiet)
+		print_report(&stats, r, cli_seconds() - begun);
+	return bad;
+}
+
+static int run(struct cli *c, const struct request *r, int argc, char **argv, struct err *e)
+{
+	struct model m = { 0 };
+	struct cache_info mesh = { 0 }, info = { 0 };
+	char key[33];
+	int bad = mesh_file_read(r->mesh, &m, &mesh, e);
+
+	if (!bad) {
+		json_t *j = options_json(&r->ff);
+		info.options = json_dumps(j, JSON_COMPACT | JSON_SORT_KEYS);
+		json_decref(j);
+		make_key(&mesh, info.options, key);
+		if (cache_up_to_date(r->output, "twopass.ff", key)) {
+			cli_note(c, "%s: up to date", r->output);
+		} else {
+			info.key = strdup(key);
+			info.history = history_append(mesh.history, argc, argv, e);
+			bad = !info.history || !info.key || compute(c, r, &m, &info, e);
+		}
+	}
+	model_free(&m);
+	cache_info_free(&mesh);
+	cache_info_free(&info);
+	return bad;
+}
+
+int main(int argc, char **argv)
+{
+	struct cli c = { .program = "ffcalc", .synopsis = "[OPTION]... -o FILE.ff FILE.mesh",
+	                 .about = "Computes the form factors of a mesh.", .options = options,
+	                 .uses_threads = 1 };
+	struct request r = { 0 };
+	struct err e = { 0 };
+
+	parse(&c, argc, argv, &r);
+	cli_signals();
+	return cli_finish(&c, run(&c, &r, argc, argv, &e) ? cli_fail(&c, &e) : 0);
+}

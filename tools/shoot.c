@@ -1,0 +1,358 @@
+/* shoot: the radiosity solution from a mesh and its form factors. */
+#include <getopt.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "../formats/digest.h"
+#include "../formats/ff_file.h"
+#include "../formats/history.h"
+#include "../formats/mesh_file.h"
+#include "../formats/rad_file.h"
+#include "../lib/mem.h"
+#include "../lib/radiosity.h"
+#include "common/cli.h"
+
+enum { OPT_RESUME = 256, OPT_LOG };
+
+static const struct cli_option options[] = {
+	{ 'o', "output", "FILE", "write the solution to FILE (.rad)" },
+	{ 'e', "stop", "X", "stop when unshot / emitted flux is X everywhere (default 1e-4)" },
+	{ 'n', "shots", "N", "stop after N shots" },
+	{ OPT_RESUME, "resume", NULL, "go on from the solution in the output file" },
+	{ OPT_LOG, "log", "FILE", "a line a round: shots, unshot flux of each band, residual, seconds" },
+	{ 0, NULL, NULL, NULL }
+};
+
+struct request {
+	const char *mesh, *output, *log;
+	char *const *ff;
+	size_t shards;
+	int resume;
+	struct radiosity_options solve;
+};
+
+struct job {
+	struct cli *cli;
+	const struct request *r;
+	struct model m;
+	struct cache_info mesh, info;
+	struct ff_file *file;       /* [shards] */
+	const struct ff **ff;       /* [shards] */
+	const char **name;          /* [shards] */
+	struct transport t;
+	struct solution s;
+	struct radiosity_report report;
+	FILE *log;
+	double begun;
+	double prepare_seconds, solve_seconds, gather_seconds;
+};
+
+static void parse(struct cli *c, int argc, char **argv, struct request *r)
+{
+	int letter;
+
+	r->solve = (struct radiosity_options){ .stop = 1e-4, .max_shots = UINT64_MAX };
+	while ((letter = cli_next(c, argc, argv)) != -1) {
+		switch (letter) {
+		case 'o': r->output = optarg; break;
+		case 'e': r->solve.stop = cli_number(c, "--stop", optarg, 0, 1); break;
+		case 'n': r->solve.max_shots = (uint64_t)cli_integer(c, "--shots", optarg, 0, 0x7fffffffffffffff); break;
+		case OPT_RESUME: r->resume = 1; break;
+		case OPT_LOG: r->log = optarg; break;
+		}
+	}
+	if (argc - optind < 2)
+		cli_usage(c, "a .mesh file and at least one .ff file are needed");
+	if (!r->output)
+		cli_usage(c, "an output is needed: -o FILE.rad");
+	r->mesh = argv[optind];
+	r->ff = argv + optind + 1;
+	r->shards = (size_t)(argc - optind - 1);
+	r->solve.threads = c->threads;
+}
+
+/* ---- inputs ---- */
+
+static int open_inputs(struct job *j, struct err *e)
+{
+	const struct request *r = j->r;
+
+	j->file = mem_new(r->shards, sizeof *j->file, "form factor files", e);
+	j->ff = mem_new(r->shards, sizeof *j->ff, "form factor files", e);
+	j->name = mem_new(r->shards, sizeof *j->name, "form factor files", e);
+	if (!j->file || !j->ff || !j->name || mesh_file_read(r->mesh, &j->m, &j->mesh, e))
+		return -1;
+	for (size_t i = 0; i < r->shards; i++) {
+		if (ff_file_open(r->ff[i], &j->m, &j->mesh, &j->file[i], e))
+			return -1;
+		j->ff[i] = &j->file[i].f;
+		j->name[i] = r->ff[i];
+	}
+	return 0;
+}
+
+/* Everything the solution depends on; cameras are looked after apart. */
+static void make_key(const struct job *j, char key[33])
+{
+	struct digest *d = digest_new();
+	const struct model *m = &j->m;
+
+	digest_string(d, "shoot " TWOPASS_VERSION);
+	digest_string(d, j->mesh.geometry_id);
+	digest_string(d, j->mesh.material_id);
+	for (size_t i = 0; i < m->surface.n; i++)
+		digest_string(d, m->surface.name[i]);
+	for (size_t i = 0; i < m->material.n; i++)
+		digest_string(d, m->material.name[i]);
+	digest_bytes(d, m->triangle_uv, 6 * m->triangles * sizeof *m->triangle_uv);
+	digest_bytes(d, m->triangle_normal, 9 * m->triangles * sizeof *m->triangle_normal);
+	for (size_t i = 0; i < j->r->shards; i++)
+		digest_string(d, j->file[i].info.key ? j->file[i].info.key : "");
+	digest_string(d, j->info.options);
+	digest_end(d, key);
+}
+
+static char *options_text(const struct request *r)
+{
+	json_t *o = json_pack("{s:f}", "stop", r->solve.stop);
+	char *text;
+
+	if (r->solve.max_shots != UINT64_MAX)
+		json_object_set_new(o, "shots", json_integer((json_int_t)r->solve.max_shots));
+	if (r->resume)
+		json_object_set_new(o, "resume", json_true());
+	text = json_dumps(o, JSON_COMPACT | JSON_SORT_KEYS);
+	json_decref(o);
+	return text;
+}
+
+/* ---- an existing output ---- */
+
+/* 1 if the output already holds this solution: as it is, or with other cameras,
+ * which are then replaced. -1 and e if that failed. */
+static int kept(struct job *j, const char *key, struct err *e)
+{
+	struct container *c;
+	struct err ignored = { 0 };
+	struct model old = { 0 };
+	struct solution s = { 0 };
+	struct cache_info info = { 0 };
+	int same_cameras, status;
+
+	if (!cache_up_to_date(j->r->output, "twopass.rad", key) ||
+	    !(c = container_open(j->r->output, "twopass.rad", &ignored)))
+		return 0;
+	const char *camera_id = container_get_meta(c, "camera_id");
+	same_cameras = camera_id && strcmp(camera_id, j->mesh.camera_id) == 0;
+	container_close(c);
+	if (same_cameras) {
+		cli_note(j->cli, "%s: up to date", j->r->output);
+		return 1;
+	}
+	if (rad_file_read(j->r->output, &old, &s, &info, &ignored))
+		return 0;
+	free(info.history);
+	info.history = strdup(j->info.history);
+	status = rad_file_write(j->r->output, &j->m, &s, &info, e);
+	if (status == 0)
+		cli_note(j->cli, "%s: cameras replaced, solution kept", j->r->output);
+	model_free(&old);
+	solution_free(&s);
+	cache_info_free(&info);
+	return status ? -1 : 1;
+}
+
+/* The state of the solver in the output file, instead of the beginning. */
+static int resume(struct job *j, struct err *e)
+{
+	struct model old = { 0 };
+	struct cache_info info = { 0 };
+	const char *path = j->r->output;
+
+	if (rad_file_read(path, &old, &j->s, &info, e))
+		return -1;
+	if (strcmp(info.geometry_id, j->mesh.geometry_id) ||
+	    strcmp(info.material_id, j->mesh.material_id))
+		err_set(e, "%s: solves another scene; run shoot without --resume", path);
+	else if (j->s.rows != j->t.rows || j->s.links != j->t.links)
+		err_set(e, "%s: was made with other form factors; run shoot without --resume", path);
+	model_free(&old);
+	cache_info_free(&info);
+	return e->set ? -1 : 0;
+}
+
+/* ---- solving ---- */
+
+static void log_step(void *arg, const struct radiosity_step *step)
+{
+	struct job *j = arg;
+
+	if (!j->log)
+		return;
+	fprintf(j->log, "%llu", (unsigned long long)step->shots);
+	for (int k = 0; k < step->bands; k++)
+		fprintf(j->log, " %.9g", step->unshot[k]);
+	fprintf(j->log, " %.3g %.6f\n", step->residual, cli_seconds() - j->begun);
+}
+
+static int solve(struct job *j, struct err *e)
+{
+	struct radiosity_hooks hooks = { log_step, j };
+	double t0 = cli_seconds(), t1, t2;
+
+	if (transport_init(&j->t, &j->m, j->ff, j->name, j->r->shards, j->cli->threads, e))
+		return -1;
+	if (j->r->resume && access(j->r->output, F_OK) == 0) {
+		if (resume(j, e))
+			return -1;
+	} else if (solution_begin(&j->s, &j->m, &j->t, e)) {
+		return -1;
+	}
+	t1 = cli_seconds();
+	if (radiosity_shoot(&j->s, &j->t, &j->r->solve, &hooks, &j->report, e))
+		return -1;
+	t2 = cli_seconds();
+	if (radiosity_gather(&j->s, &j->t, j->cli->threads, &j->report, e))
+		return -1;
+	j->prepare_seconds = t1 - t0;
+	j->solve_seconds = t2 - t1;
+	j->gather_seconds = cli_seconds() - t2;
+	return 0;
+}
+
+/* ---- the report ---- */
+
+static const char *const term_name[LEDGER_TERMS] = { "emitted", "absorbed", "escaped", "lost",
+                                                     "cut" };
+
+static json_t *number(double x)
+{
+	return isfinite(x) ? json_real(x) : json_string("no finite bound");
+}
+
+static char *report_text(const struct job *j)
+{
+	const struct radiosity_report *r = &j->report;
+	json_t *ledger = json_object(), *o;
+	char *text;
+
+	for (int term = 0; term < LEDGER_TERMS; term++) {
+		json_t *band = json_array();
+		for (int k = 0; k < j->s.bands; k++)
+			json_array_append_new(band, json_real(j->s.ledger[term * j->s.bands + k]));
+		json_object_set_new(ledger, term_name[term], band);
+	}
+	o = json_pack("{s:o, s:I, s:i, s:f, s:o, s:f, s:o, s:f}", "ledger", ledger,
+	              "shots", (json_int_t)j->s.shots, "components", r->components,
+	              "unshot", r->unshot, "truncation_bound", number(r->bound),
+	              "guessed_directions", r->guessed, "ledger_residual", number(r->residual),
+	              "mean_error", solution_mean_error(&j->m, &j->s));
+	text = json_dumps(o, JSON_COMPACT);
+	json_decref(o);
+	return text;
+}
+
+static void print_report(const struct job *j)
+{
+	const struct solution *s = &j->s;
+	const struct radiosity_report *r = &j->report;
+
+	printf("shots         %llu in %llu rounds, %d lit component%s\n",
+	       (unsigned long long)s->shots, (unsigned long long)r->rounds, r->components,
+	       r->components == 1 ? "" : "s");
+	for (int term = 0; term < LEDGER_TERMS; term++) {
+		printf("%-13s", term_name[term]);
+		for (int k = 0; k < s->bands; k++)
+			printf(" %.9g", s->ledger[term * s->bands + k]);
+		printf("\n");
+	}
+	printf("unshot        %.3g of what is emitted\n", r->unshot);
+	printf("residual      %.3g of what is emitted, worst of every shot\n", r->residual);
+	if (isfinite(r->bound))
+		printf("truncation    at most %.3g of what is emitted still to arrive (certified)\n",
+		       r->bound);
+	else
+		printf("truncation    no finite bound\n");
+	printf("sampling      %.3g relative standard error of irradiance, mean over area\n",
+	       solution_mean_error(&j->m, s));
+	if (r->guessed > 0)
+		printf("directions    %.3g of what is emitted used the nearest known direction\n",
+		       r->guessed);
+	printf("seconds       %.3f join, %.3f shoot, %.3f elements (%.2f GB/s of form factors)\n",
+	       j->prepare_seconds, j->solve_seconds, j->gather_seconds,
+	       r->gather_bytes / j->gather_seconds * 1e-9);
+	printf("peak memory   %.0f MB\n", cli_peak_megabytes());
+}
+
+static int make(struct job *j, struct err *e)
+{
+	if (j->r->log && !(j->log = fopen(j->r->log, "w")))
+		return err_set(e, "%s: cannot write the log", j->r->log);
+	int bad = solve(j, e);
+	if (j->log && fclose(j->log) && !bad)
+		bad = err_set(e, "%s: cannot write the log", j->r->log);
+	if (bad)
+		return -1;
+	j->info.report = report_text(j);
+	return rad_file_write(j->r->output, &j->m, &j->s, &j->info, e);
+}
+
+static int run(struct job *j, int argc, char **argv, struct err *e)
+{
+	char key[33];
+	int done;
+
+	j->begun = cli_seconds();
+	if (open_inputs(j, e))
+		return -1;
+	j->info.options = options_text(j->r);
+	j->info.history = history_append(j->file[0].info.history, argc, argv, e);
+	if (!j->info.history)
+		return -1;
+	make_key(j, key);
+	j->info.key = strdup(key);
+	/* A resumed run begins from its own output, so it is never up to date. */
+	done = j->r->resume ? 0 : kept(j, key, e);
+	if (done)
+		return done < 0 ? -1 : 0;
+	if (make(j, e))
+		return -1;
+	if (!j->cli->quiet)
+		print_report(j);
+	return 0;
+}
+
+static void job_free(struct job *j)
+{
+	transport_free(&j->t);
+	solution_free(&j->s);
+	for (size_t i = 0; j->file && i < j->r->shards; i++)
+		ff_file_close(&j->file[i]);
+	free(j->file);
+	free(j->ff);
+	free(j->name);
+	model_free(&j->m);
+	cache_info_free(&j->mesh);
+	cache_info_free(&j->info);
+}
+
+int main(int argc, char **argv)
+{
+	struct cli c = { .program = "shoot", .synopsis = "[OPTION]... -o FILE.rad FILE.mesh FILE.ff...",
+	                 .about = "Solves for the light in a scene by progressive shooting.",
+	                 .options = options, .uses_threads = 1 };
+	struct request r = { 0 };
+	struct job j = { .cli = &c, .r = &r };
+	struct err e = { 0 };
+	int status;
+
+	parse(&c, argc, argv, &r);
+	cli_signals();
+	status = run(&j, argc, argv, &e) ? cli_fail(&c, &e) : 0;
+	job_free(&j);
+	return cli_finish(&c, status);
+}
