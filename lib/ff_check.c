@@ -60,8 +60,10 @@ static int check_scene(const struct ff_scene *s, struct err *e)
 	if (s->elements == 0 || s->elements > INT32_MAX || s->patches == 0)
 		return err_set(e, "array patch_start: %zu patches of %zu elements", s->patches,
 		               s->elements);
-	if (s->patch_start[0] != 0)
-		return err_set(e, "array patch_start: it does not begin with 0");
+	if (s->patch_start[0] != 0 || s->patch_start[s->patches] != s->elements)
+		return err_set(e, "array patch_start: it runs from %" PRIu32 " to %" PRIu32
+		               " and should from 0 to %zu", s->patch_start[0],
+		               s->patch_start[s->patches], s->elements);
 	for (size_t p = 0; p < s->patches; p++) {
 		if (s->patch_start[p + 1] <= s->patch_start[p])
 			return err_set(e, "array patch_start: patch %zu has no elements", p);
