@@ -22,7 +22,6 @@ PACKAGES := gcc g++ make pkg-config libembree-dev libopenexr-dev libtinygltf-dev
 
 BUILD ?= build$(if $(SAN),-san)
 OPT ?= -O2 -march=x86-64-v3
-SANFLAGS := $(if $(SAN),-fsanitize=address$(,)undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
 , := ,
 SANFLAGS := $(if $(SAN),-fsanitize=address$(,)undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
 WARN := -Wall -Wextra -Wpedantic -Wshadow -Wconversion
@@ -69,9 +68,75 @@ $(BUILD)/%.o: %.cc
 
 unit: $(UNIT_TESTS)
 
+# ---- the machine ----
+
+# Installs the packages that are not there yet (root, or sudo).
+deps:
+	@missing=; for p in $(PACKAGES); do \
+		dpkg-query -W -f '$${Status}' $$p 2>/dev/null | grep -q 'ok installed' || missing="$$missing $$p"; \
+	done; \
+	if [ -n "$$missing" ]; then \
+		echo "installing:$$missing"; \
+		sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
+		$$sudo apt-get update -qq && \
+		DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -y -qq --no-install-recommends $$missing; \
+	fi
+
+# ---- the demo: a new make, so that it sees packages just installed ----
+
+demo: deps
+	@$(MAKE) --no-print-directory -j2 all
+	@MAKE='$(MAKE)' scenes/demo.sh $(BUILD) out
+
+# ---- tests ----
+
+CHECKS := $(sort $(wildcard tests/tools/*.t tests/tools/*.py))
+
+check: deps
+	@$(MAKE) --no-print-directory -j2 all unit
+	@$(MAKE) --no-print-directory check-layers check-man
+	@BUILD=$(abspath $(BUILD)) PYTHON=$(PYTHON) tests/run.pl $(UNIT_TESTS) $(CHECKS)
+
+# Arrows point down only: tools -> formats -> lib, and lib knows no files.
+check-layers:
+	@! grep -nE '#include "(\.\./)*(formats|tools)/' lib/*.[ch] || { echo "lib must not include formats or tools"; exit 1; }
+	@! grep -nE '#include "(\.\./)*tools/' formats/*.[ch] formats/*.cc || { echo "formats must not include tools"; exit 1; }
+	@! grep -nE '\b(fopen|fread|fwrite|printf|fprintf|exit|abort)\(' lib/*.c || { echo "lib must not do files, print or exit"; exit 1; }
+	@! grep -nE '\b(cos|sin|tan|acos|asin|atan2?|M_PI)\b *\(|3\.14159' tools/*.c tools/common/*.c formats/*.c || { echo "physics belongs in lib"; exit 1; }
+	@[ "$$(grep -l 'rtcore.h' lib/*.c)" = lib/ray.c ] || { echo "Embree belongs in lib/ray.c"; exit 1; }
+	@echo "layers: ok"
+
+check-man:
+	@bad=$$(for p in man/*.[1-9]; do mandoc -T lint -W warning $$p; done); [ -z "$$bad" ] || { echo "$$bad"; exit 1; }
+	@echo "manual pages: ok"
+
+# What the methods make of every exact answer we have.
+oracles: all
+	BUILD=$(abspath $(BUILD)) $(PYTHON) tests/oracles.py --all
+
+bench: all $(BENCHES)
+	BUILD=$(abspath $(BUILD)) sh tests/bench/run.sh
+
+format:
+	clang-format -i lib/*.[ch] formats/*.[ch] formats/*.cc tools/*.c tools/common/*.[ch] tests/unit/*.[ch]
+
+# ---- installation ----
+
+install: all
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib \
+		$(DESTDIR)$(PREFIX)/include/twopass/lib $(DESTDIR)$(PREFIX)/include/twopass/formats \
+		$(DESTDIR)$(PREFIX)/share/twopass $(DESTDIR)$(PREFIX)/share/man/man1 \
+		$(DESTDIR)$(PREFIX)/share/man/man5 $(DESTDIR)$(PREFIX)/share/man/man7
+	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
+	install -m 644 $(BUILD)/libcommon.a $(DESTDIR)$(PREFIX)/lib
+	install -m 644 lib/*.h $(DESTDIR)$(PREFIX)/include/twopass/lib
+	install -m 644 formats/*.h $(DESTDIR)$(PREFIX)/include/twopass/formats
+	install -m 644 tools/pipeline.mk $(DESTDIR)$(PREFIX)/share/twopass
+	for s in 1 5 7; do install -m 644 man/*.$$s $(DESTDIR)$(PREFIX)/share/man/man$$s; done
+
 clean:
 	rm -rf build build-san out
 
-.PHONY: all unit clean
+.PHONY: all unit deps demo check check-layers check-man oracles bench format install clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
