@@ -112,14 +112,15 @@ static int all_grey(const struct palette *p)
 	return 1;
 }
 
-/* How working bands become those of the model. */
+/* How working bands become those of the model: grey RGB is one band, but bands that
+ * the extras name are kept. */
 enum conversion { SAME, REPLICATE, LUMINANCE };
 
 static int choose_bands(const struct palette *p, int *bands, enum conversion *how)
 {
 	int isgrey = all_grey(p), asked = p->g->options->bands;
 
-	*bands = asked ? asked : isgrey ? 1 : p->working;
+	*bands = asked ? asked : isgrey && p->working == RGB ? 1 : p->working;
 	if (isgrey)
 		*how = REPLICATE;
 	else if (*bands == p->working)
