@@ -112,16 +112,19 @@ static int map_scene(struct ff_file *o, struct err *e)
 	return cache_read_names(c, "surfaces", &o->surface_name, o->surfaces, e);
 }
 
-static int check_model(const struct ff_file *o, const struct model *m,
-                       const struct cache_info *m_info, struct err *e)
+static int check_id(const struct ff_file *o, const struct cache_info *m_info, struct err *e)
 {
-	int other = m_info && strcmp(m_info->geometry_id, o->info.geometry_id) != 0;
+	return m_info && strcmp(m_info->geometry_id, o->info.geometry_id) != 0
+	           ? container_refuse(o->container, e, "made for another geometry") : 0;
+}
 
-	if (m && !other)
-		other = m->patches != o->scene.patches || m->elements != o->scene.elements ||
-		        m->material.n != o->scene.materials ||
-		        memcmp(m->patch_start, o->scene.patch_start,
-		               (m->patches + 1) * sizeof *m->patch_start) != 0;
+static int check_patches(const struct ff_file *o, const struct model *m, struct err *e)
+{
+	int other = m && (m->patches != o->scene.patches || m->elements != o->scene.elements ||
+	                  m->material.n != o->scene.materials ||
+	                  memcmp(m->patch_start, o->scene.patch_start,
+	                         (m->patches + 1) * sizeof *m->patch_start) != 0);
+
 	return other ? container_refuse(o->container, e, "made for another geometry") : 0;
 }
 
@@ -132,9 +135,9 @@ static int open_ff(const char *path, const struct model *m, const struct cache_i
 
 	/* Binding first: for a file of another scene the rest does not matter. */
 	if (!(o->container = container_open(path, FORMAT, e)) ||
-	    cache_read_info(o->container, &o->info, e) || map_scene(o, e) ||
-	    check_model(o, m, m_info, e) || container_verify_all(o->container, e) ||
-	    map_ff(o->container, &o->f, e))
+	    cache_read_info(o->container, &o->info, e) || check_id(o, m_info, e) ||
+	    container_verify_all(o->container, e) || map_scene(o, e) ||
+	    check_patches(o, m, e) || map_ff(o->container, &o->f, e))
 		return -1;
 	return ff_check(&o->f, &o->scene, &why) ? container_refuse(o->container, e, "%s", why.text)
 	                                        : 0;

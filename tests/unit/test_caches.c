@@ -1,0 +1,573 @@
+/* .mesh, .ff and .rad files: round trips and refusals. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "../../formats/ff_file.h"
+#include "../../formats/mesh_file.h"
+#include "../../formats/rad_file.h"
+#include "../../lib/model_check.h"
+#include "small_scene.h"
+
+static char directory[] = "/tmp/twopass-caches-XXXXXX";
+static char mesh_path[64], ff_path[64], rad_path[64];
+static struct model model;
+static struct ff ff;
+static struct solution solution;
+static struct cache_info info = { .history = "mesh a.gltf", .options = "{}",
+                                  .report = "{\"n\":1}", .key = "k" };
+
+static int set_up(void **state)
+{
+	(void)state;
+	if (!mkdtemp(directory))
+		return -1;
+	snprintf(mesh_path, sizeof mesh_path, "%s/a.mesh", directory);
+	snprintf(ff_path, sizeof ff_path, "%s/a.ff", directory);
+	snprintf(rad_path, sizeof rad_path, "%s/a.rad", directory);
+	small_model(&model);
+	small_ff(&ff);
+	small_solution(&solution, &model);
+	return 0;
+}
+
+static int tear_down(void **state)
+{
+	char command[128];
+
+	(void)state;
+	model_free(&model);
+	ff_free(&ff);
+	solution_free(&solution);
+	snprintf(command, sizeof command, "rm -rf %s", directory);
+	return system(command);
+}
+
+static void must(int status, const struct err *e)
+{
+	if (status)
+		fail_msg("%s", e->text);
+}
+
+/* ---- writing the three files ---- */
+
+static void write_mesh(void)
+{
+	struct err e = { 0 };
+
+	must(mesh_file_write(mesh_path, &model, &info, &e), &e);
+}
+
+static void write_rad(void)
+{
+	struct err e = { 0 };
+
+	must(rad_file_write(rad_path, &model, &solution, &info, &e), &e);
+}
+
+/* In two batches: rows of patch 0, then the row of patch 1. */
+static int try_write_ff(const struct ff *f, struct err *e)
+{
+	const uint64_t blocks[] = { 0, 1 }, entries[] = { 0, 2 }, arrivals[] = { 0, 0 };
+	struct ff_writer *w = ff_file_create(ff_path, &model, 0, e);
+
+	if (!w)
+		return -1;
+	struct ff first = *f, second = *f;
+	first.rows = 2, first.blocks = 3, first.entries = 3, first.links = 0;
+	second.rows = 1, second.blocks = 1, second.entries = 2;
+	second.arrivals = second.links = 0;
+	second.row_side += 2, second.row_kind += 2, second.row_samples += 2;
+	second.row_scale += 2, second.row_residual += 2, second.row_error += 2;
+	second.row_block = (uint64_t *)blocks;
+	second.block_chain += 3, second.block_escape += 3, second.block_black += 3;
+	second.block_lost += 3, second.block_cut += 3;
+	second.block_start = (uint64_t *)entries;
+	second.block_arrival = (uint64_t *)arrivals;
+	second.column += 3, second.value += 3;
+	if (ff_file_append(w, &first, e) || ff_file_append(w, &second, e)) {
+		ff_file_abandon(w);
+		return -1;
+	}
+	/* The lobe row comes in a batch of its own with the link to it. */
+	const uint64_t last_entries[] = { 0, 1 };
+	const uint32_t link_row[] = { 0, FF_NO_ROW };
+	struct ff third = *f;
+	third.rows = 1, third.blocks = 1, third.entries = 1, third.arrivals = 0;
+	third.row_side += 3, third.row_kind += 3, third.row_samples += 3;
+	third.row_scale += 3, third.row_residual += 3, third.row_error += 3;
+	third.row_block = (uint64_t *)blocks;
+	third.block_chain += 4, third.block_escape += 4, third.block_black += 4;
+	third.block_lost += 4, third.block_cut += 4;
+	third.block_start = (uint64_t *)last_entries;
+	third.block_arrival = (uint64_t *)arrivals;
+	third.column += 5, third.value += 5;
+	third.link_row = (uint32_t *)link_row;
+	if (ff_file_append(w, &third, e)) {
+		ff_file_abandon(w);
+		return -1;
+	}
+	return ff_file_finish(w, f, &info, e);
+}
+
+static void write_ff(void)
+{
+	struct err e = { 0 };
+
+	must(try_write_ff(&ff, &e), &e);
+}
+
+/* ---- round trips ---- */
+
+#define SAME(a, b, n) assert_memory_equal(a, b, (n) * sizeof *(a))
+
+static void check_model(const struct model *m)
+{
+	assert_int_equal(m->bands, 3);
+	assert_int_equal(m->lobe, model.lobe);
+	assert_string_equal(m->material.name[1], "lamp \"B\"");
+	assert_string_equal(m->surface.name[1], "Lämpchen");
+	SAME(m->material.rho_d, model.material.rho_d, 12);
+	SAME(m->material.tau_s, model.material.tau_s, 12);
+	SAME(m->material.alpha, model.material.alpha, 4);
+	assert_true(isinf(m->material.beta[0]));
+	SAME(m->material.emission, model.material.emission, 12);
+	SAME(m->vertex, model.vertex, 15);
+	SAME(m->split, model.split, 1);
+	SAME(m->element, model.element, 9);
+	SAME(m->patch_loop, model.patch_loop, 3);
+	SAME(m->loop_index, model.loop_index, 4);
+	SAME(m->patch_area, model.patch_area, 2);
+	assert_int_equal(m->cameras, 2);
+	assert_string_equal(m->camera[1].name, "far");
+	assert_int_equal(m->camera[1].orthographic, 1);
+	assert_true(m->camera[0].yfov == .7 && m->camera[0].to_world[14] == 5);
+}
+
+static void test_mesh(void **state)
+{
+	struct model m = { 0 };
+	struct cache_info i = { 0 };
+	struct err e = { 0 };
+
+	(void)state;
+	write_mesh();
+	must(mesh_file_read(mesh_path, &m, &i, &e), &e);
+	check_model(&m);
+	assert_string_equal(i.history, info.history);
+	assert_string_equal(i.report, info.report);
+	assert_int_equal(strlen(i.geometry_id), 32);
+	model_free(&m);
+	cache_info_free(&i);
+}
+
+static void test_rad(void **state)
+{
+	struct model m = { 0 };
+	struct solution s = { 0 };
+	struct cache_info i = { 0 };
+	struct err e = { 0 };
+
+	(void)state;
+	write_rad();
+	must(rad_file_read(rad_path, &m, &s, &i, &e), &e);
+	check_model(&m);
+	assert_int_equal(s.shots, 42);
+	assert_int_equal(s.links, 1);
+	SAME(s.direct, solution.direct, 18);
+	SAME(s.error, solution.error, 18);
+	SAME(s.unshot_link, solution.unshot_link, 6);
+	SAME(s.ledger, solution.ledger, LEDGER_TERMS * 3);
+	model_free(&m);
+	solution_free(&s);
+	cache_info_free(&i);
+}
+
+static void test_ff(void **state)
+{
+	struct cache_info ids = { 0 };
+	struct ff_file f;
+	struct err e = { 0 };
+
+	(void)state;
+	write_ff();
+	cache_ids(&model, &ids);
+	must(ff_file_open(ff_path, &model, &ids, &f, &e), &e);
+	assert_int_equal(f.f.rows, ff.rows);
+	SAME(f.f.row_block, ff.row_block, 5);
+	SAME(f.f.block_start, ff.block_start, 6);
+	SAME(f.f.column, ff.column, 6);
+	SAME(f.f.value, ff.value, 6);
+	assert_null(f.f.value64);
+	SAME(f.f.block_escape, ff.block_escape, 5);
+	SAME(f.f.link_row, ff.link_row, 2);
+	SAME(f.f.chain_start, ff.chain_start, 3);
+	assert_int_equal(f.f.patch_end, 2);
+	assert_int_equal(f.patches, 2);
+	assert_string_equal(f.surface_name[f.patch_surface[1]], "Lämpchen");
+	assert_int_equal(f.scene.patch_sides[0], 3);
+	assert_int_equal(f.scene.patch_sides[1], 1);
+	SAME(f.scene.patch_area, model.patch_area, 2);
+	ff_file_close(&f);
+}
+
+static void test_ff_of_another_geometry(void **state)
+{
+	struct cache_info ids = { 0 };
+	struct ff_file f;
+	struct err e = { 0 };
+
+	(void)state;
+	write_ff();
+	model.vertex[0] = 1e-9;
+	cache_ids(&model, &ids);
+	model.vertex[0] = 0;
+	assert_int_equal(ff_file_open(ff_path, &model, &ids, &f, &e), -1);
+	assert_non_null(strstr(e.text, "a.ff: made for another geometry; run ffcalc again"));
+}
+
+/* ---- ids ---- */
+
+static void ids_after(double *where, double value, struct cache_info *i)
+{
+	double old = *where;
+
+	*where = value;
+	cache_ids(&model, i);
+	*where = old;
+}
+
+static void test_ids(void **state)
+{
+	struct cache_info a = { 0 }, b = { 0 };
+
+	(void)state;
+	cache_ids(&model, &a);
+	ids_after(&model.material.rho_d[0], .4, &b); /* repainted */
+	assert_string_equal(a.geometry_id, b.geometry_id);
+	assert_string_not_equal(a.material_id, b.material_id);
+	ids_after(&model.material.rho_s[0], 0, &b); /* still glossy in other bands */
+	assert_string_equal(a.geometry_id, b.geometry_id);
+	ids_after(&model.material.alpha[0], 21, &b);
+	assert_string_not_equal(a.geometry_id, b.geometry_id);
+	ids_after(&model.material.alpha[2], 21, &b); /* of a coefficient that is 0 */
+	assert_string_equal(a.geometry_id, b.geometry_id);
+	ids_after(&model.camera[0].yfov, .8, &b);
+	assert_string_equal(a.geometry_id, b.geometry_id);
+	assert_string_equal(a.material_id, b.material_id);
+	assert_string_not_equal(a.camera_id, b.camera_id);
+	model.lobe = LOBE_RECIPROCAL;
+	cache_ids(&model, &b);
+	model.lobe = LOBE_PAPER;
+	assert_string_not_equal(a.geometry_id, b.geometry_id);
+}
+
+/* ---- models that are refused ---- */
+
+static void refuse_model(const char *message)
+{
+	struct err e = { 0 };
+
+	if (!model_check(&model, &e) || !strstr(e.text, message))
+		fail_msg("'%s' instead of '%s'", e.set ? e.text : "accepted", message);
+}
+
+static void refuse_double(double *where, double value, const char *message)
+{
+	double old = *where;
+
+	*where = value;
+	refuse_model(message);
+	*where = old;
+}
+
+static void refuse_uint(uint32_t *where, uint32_t value, const char *message)
+{
+	uint32_t old = *where;
+
+	*where = value;
+	refuse_model(message);
+	*where = old;
+}
+
+static void refuse_int(int32_t *where, int32_t value, const char *message)
+{
+	int32_t old = *where;
+
+	*where = value;
+	refuse_model(message);
+	*where = old;
+}
+
+static void test_refused_models(void **state)
+{
+	struct materials *mt = &model.material;
+	struct err e = { 0 };
+
+	(void)state;
+	must(model_check(&model, &e), &e);
+	refuse_double(&mt->rho_d[1], .7, "material 'glossy', front, band 1: they sum to 1.075");
+	refuse_double(&mt->rho_d[4], -.1, "material_rho_d: material 'glossy', back, band 1");
+	refuse_double(&mt->tau_s[0], (double)NAN, "array material_tau_s: material 'glossy'");
+	refuse_double(&mt->alpha[1], -1, "array material_alpha: material 'glossy', back");
+	refuse_double(&mt->beta[0], (double)NAN, "array material_beta");
+	refuse_double(&mt->emission[6], (double)INFINITY, "array material_emission: material 'lamp");
+	refuse_double(&mt->emission_exponent[2], (double)INFINITY, "material_emission_exponent");
+	refuse_double(&mt->tau_d[6], .1, "one-sided but transmits");
+	refuse_double(&model.vertex[4], (double)NAN, "array vertex: value 4 is nan");
+	refuse_double(&model.camera[0].yfov, 4, "array camera_yfov: camera 'near'");
+	refuse_double(&model.camera[0].yfov, 0, "array camera_yfov: camera 'near'");
+	refuse_double(&model.camera[1].xmag, 0, "camera_xmag, camera_ymag: camera 'far'");
+	refuse_double(&model.camera[0].to_world[0], 2, "array camera_to_world: camera 'near'");
+	refuse_double(&model.camera[0].to_world[12], (double)NAN, "array camera_to_world");
+	refuse_uint(&model.triangle[5], 5, "array triangle: value 5 is 5, which must be below 5");
+	refuse_uint(&model.element[0], 99, "array element: value 0 is 99");
+	refuse_uint(&model.element[0], 4, "array element: element 0 has area 0");
+	refuse_uint(&model.surface.material[0], 2, "array surface_material");
+	refuse_uint(&model.triangle_surface[1], 2, "array triangle_surface");
+	refuse_uint(&model.triangle_surface[1], 0, "patch 1 holds element 2 of another surface");
+	refuse_uint(&model.element_triangle[0], 1, "array element_triangle: the tree of");
+	refuse_uint(&model.patch_start[1], 3, "array patch_start: patch 1 has no elements");
+	refuse_uint(&model.patch_start[1], 4000000000u, "array patch_start: patch");
+	refuse_uint(&model.patch_start[2], 2, "array patch_start: it runs from 0 to 2");
+	refuse_uint(&model.patch_surface[0], 7, "array patch_surface");
+	refuse_uint(&model.loop_index[3], 5, "array loop_index");
+	refuse_int(&model.triangle_split[0], 1, "leads to split 1 of 1");
+	refuse_int(&model.triangle_split[1], ~3, "leads to element 3 of 3");
+	refuse_int(&model.triangle_split[1], ~0, "element 0 is reached twice");
+	refuse_int(&model.triangle_split[1], INT32_MIN, "leads to element 2147483647");
+	refuse_int(&model.split[0].child[0], 0, "split 0 is reached twice");
+	refuse_int(&model.split[0].edge, 3, "split 0 has edge 3");
+	model.loop_start[1] = 2;
+	refuse_model("array loop_start: it runs from 0 to 2");
+	model.loop_start[1] = 4;
+	char *name = model.surface.name[0];
+	model.surface.name[0] = model.surface.name[1];
+	refuse_model("names of surfaces: 'Lämpchen' is there twice");
+	model.surface.name[0] = name;
+}
+
+static void test_bad_model_is_not_written(void **state)
+{
+	struct err e = { 0 };
+	struct stat before, after;
+
+	(void)state;
+	write_mesh();
+	assert_int_equal(stat(mesh_path, &before), 0);
+	model.vertex[0] = (double)NAN;
+	assert_int_equal(mesh_file_write(mesh_path, &model, &info, &e), -1);
+	model.vertex[0] = 0;
+	assert_non_null(strstr(e.text, "a.mesh: cannot write: array vertex: value 0 is nan"));
+	assert_int_equal(stat(mesh_path, &after), 0);
+	assert_int_equal(before.st_ino, after.st_ino);
+	e.set = 0;
+	solution.direct[3] = (double)INFINITY;
+	assert_int_equal(rad_file_write(rad_path, &model, &solution, &info, &e), -1);
+	solution.direct[3] = 1.5;
+	assert_non_null(strstr(e.text, "a.rad: cannot write: array irradiance_direct: value 3"));
+}
+
+/* ---- form factors that are refused ---- */
+
+static void refuse_ff(void *where, const void *value, size_t bytes, const char *message)
+{
+	unsigned char old[8];
+	struct ff_file f;
+	struct err e = { 0 };
+
+	memcpy(old, where, bytes);
+	memcpy(where, value, bytes);
+	must(try_write_ff(&ff, &e), &e);
+	memcpy(where, old, bytes);
+	if (!ff_file_open(ff_path, NULL, NULL, &f, &e) || !strstr(e.text, message))
+		fail_msg("'%s' instead of '%s'", e.set ? e.text : "accepted", message);
+	assert_non_null(strstr(e.text, "a.ff: array "));
+	assert_non_null(strstr(e.text, "; run ffcalc again"));
+}
+
+#define REFUSE(where, type, value, message) \
+	refuse_ff(&(where), &(type){ value }, sizeof(type), message)
+
+static void test_refused_form_factors(void **state)
+{
+	(void)state;
+	REFUSE(ff.value[0], float, .3125f, "array value: row 0 sums to 1.0625 instead of 1");
+	REFUSE(ff.value[1], float, -1, "array value: value 1 is -1");
+	REFUSE(ff.value[2], float, (float)NAN, "array value: value 2 is nan");
+	REFUSE(ff.column[0], uint32_t, 6, "array column: value 0 is 6");
+	REFUSE(ff.column[1], uint32_t, 1, "array column: value 1 is out of order");
+	REFUSE(ff.column[1], uint32_t, 0, "array column: value 1 is out of order");
+	REFUSE(ff.row_scale[3], double, 0, "array row_scale: value 3 is 0");
+	REFUSE(ff.row_error[0], double, -1, "array row_error");
+	REFUSE(ff.row_residual[0], double, (double)NAN, "array row_residual");
+	REFUSE(ff.row_side[1], uint32_t, 4, "array row_side: row 1 leaves patch 2");
+	REFUSE(ff.row_kind[1], uint8_t, 4, "array row_kind: value 1 is 4");
+	REFUSE(ff.row_block[1], uint64_t, 0, "array row_block");
+	REFUSE(ff.row_block[1], uint64_t, UINT64_MAX, "array row_block");
+	REFUSE(ff.block_start[1], uint64_t, 1000, "array block_start");
+	REFUSE(ff.block_arrival[1], uint64_t, 2, "array block_arrival");
+	REFUSE(ff.block_chain[0], uint32_t, 1, "array block_chain: row 0 does not begin");
+	REFUSE(ff.block_chain[1], uint32_t, 0, "array block_chain: block 1 is out of order");
+	REFUSE(ff.block_chain[1], uint32_t, 2, "array block_chain: value 1 is 2");
+	REFUSE(ff.block_escape[1], double, -1, "array block_escape");
+	REFUSE(ff.chain_event[0], uint32_t, 8, "array chain_event");
+	REFUSE(ff.chain_count[0], uint32_t, 0, "array chain_count");
+	REFUSE(ff.chain_start[1], uint64_t, 1, "chain 0 is not empty");
+	REFUSE(ff.arrival_target[0], uint32_t, 4, "array arrival_target");
+	REFUSE(ff.arrival_direction[0], float, 1, "array arrival_direction");
+	REFUSE(ff.link_source[0], uint32_t, 4, "array link_source");
+	REFUSE(ff.link_chain[0], uint32_t, 2, "array link_chain");
+	REFUSE(ff.link_target[0], uint32_t, 1, "array link_row: link 0 has row 3");
+	REFUSE(ff.patch_end, uint32_t, 3, "array part: patches 0 to 3 of 2");
+	REFUSE(ff.part, uint32_t, 2, "array part: part 2 of 1");
+}
+
+/* ---- damaged files ---- */
+
+static int read_file(const char *path, struct err *e)
+{
+	struct model m = { 0 };
+	struct solution s = { 0 };
+	struct cache_info i = { 0 };
+	struct ff_file f;
+	int failed;
+
+	if (path == ff_path) {
+		failed = ff_file_open(path, NULL, NULL, &f, e);
+		if (!failed)
+			ff_file_close(&f);
+		return failed;
+	}
+	failed = path == mesh_path ? mesh_file_read(path, &m, &i, e)
+	                           : rad_file_read(path, &m, &s, &i, e);
+	model_free(&m);
+	solution_free(&s);
+	cache_info_free(&i);
+	return failed;
+}
+
+static void damage(const char *path)
+{
+	struct stat st;
+	uint64_t header;
+	int fd = open(path, O_RDWR);
+
+	assert_int_equal(fstat(fd, &st), 0);
+	assert_int_equal(pread(fd, &header, 8, 0), 8);
+	for (off_t i = 0; i < st.st_size; i++) {
+		unsigned char good, bad;
+		struct err e = { 0 };
+		assert_int_equal(pread(fd, &good, 1, i), 1);
+		bad = good ^ (unsigned char)(1u << i % 8);
+		assert_int_equal(pwrite(fd, &bad, 1, i), 1);
+		if (!read_file(path, &e))
+			fail_msg("%s: flipped byte %ld was accepted", path, (long)i);
+		assert_int_equal(strncmp(e.text, path, strlen(path)), 0);
+		if ((uint64_t)i >= 8 + header)
+			assert_non_null(strstr(e.text, "array "));
+		assert_int_equal(pwrite(fd, &good, 1, i), 1);
+	}
+	for (off_t n = st.st_size - 1; n >= 0; n -= 1 + n % 3) {
+		struct err e = { 0 };
+		assert_int_equal(ftruncate(fd, n), 0);
+		assert_int_equal(read_file(path, &e), -1);
+	}
+	close(fd);
+}
+
+static void test_damaged(void **state)
+{
+	(void)state;
+	write_mesh();
+	damage(mesh_path);
+	write_rad();
+	damage(rad_path);
+	write_ff();
+	damage(ff_path);
+}
+
+static void test_wrong_kind(void **state)
+{
+	struct model m = { 0 };
+	struct cache_info i = { 0 };
+	struct err e = { 0 };
+
+	(void)state;
+	write_rad();
+	assert_int_equal(mesh_file_read(rad_path, &m, &i, &e), -1);
+	assert_non_null(strstr(e.text, "this is a twopass.rad file; a twopass.mesh file"));
+}
+
+/* The ids are computed from what is written, so a stranger's are noticed. */
+static void test_foreign_ids(void **state)
+{
+	struct err e = { 0 };
+	struct cache_info ids = { 0 };
+	struct model m = { 0 };
+	struct container_writer *w = container_create(mesh_path, &e);
+
+	(void)state;
+	model.vertex[0] = 1e-9;
+	cache_ids(&model, &ids);
+	model.vertex[0] = 0;
+	must(mesh_put_model(w, &model, &e), &e);
+	must(cache_write_info(w, "twopass.mesh", &ids, &e), &e);
+	must(container_finish(w, &e), &e);
+	assert_int_equal(mesh_file_read(mesh_path, &m, &ids, &e), -1);
+	assert_non_null(strstr(e.text, "metadata geometry_id: not that of the arrays"));
+}
+
+/* Moving a camera leaves what later files bind to; painting does not. */
+static void test_digest(void **state)
+{
+	char a[33], b[33], d[33];
+	struct err e = { 0 };
+
+	(void)state;
+	write_mesh();
+	struct container *c = container_open(mesh_path, NULL, &e);
+	container_digest(c, a);
+	container_close(c);
+	model.camera[0].to_world[12] = 3;
+	write_mesh();
+	c = container_open(mesh_path, NULL, &e);
+	container_digest(c, b);
+	container_close(c);
+	model.camera[0].to_world[12] = 0;
+	model.material.rho_d[0] = .4;
+	write_mesh();
+	c = container_open(mesh_path, NULL, &e);
+	container_digest(c, d);
+	container_close(c);
+	model.material.rho_d[0] = .5;
+	assert_string_equal(a, b);
+	assert_string_not_equal(a, d);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_mesh),
+		cmocka_unit_test(test_rad),
+		cmocka_unit_test(test_ff),
+		cmocka_unit_test(test_ff_of_another_geometry),
+		cmocka_unit_test(test_ids),
+		cmocka_unit_test(test_refused_models),
+		cmocka_unit_test(test_bad_model_is_not_written),
+		cmocka_unit_test(test_refused_form_factors),
+		cmocka_unit_test(test_damaged),
+		cmocka_unit_test(test_wrong_kind),
+		cmocka_unit_test(test_foreign_ids),
+		cmocka_unit_test(test_digest),
+	};
+
+	return cmocka_run_group_tests(tests, set_up, tear_down);
+}
