@@ -76,9 +76,7 @@ static int compare_keys(const void *pa, const void *pb)
 	return a < b ? -1 : a > b;
 }
 
-/* A vertex of its own for each surface that uses it, in the order of the old
- * ones; group[v] becomes the surface of new vertex v. */
-static int separate_surfaces(struct model *m, uint32_t **group, struct err *e)
+int clean_separate(struct model *m, uint32_t **group, struct err *e)
 {
 	int status = -1;
 	size_t corners = 3 * m->triangles, n = 0;
@@ -168,7 +166,7 @@ int clean_model(struct model *m, struct mesher_report *r, struct err *e)
 	double *tolerance = NULL;
 	size_t count;
 
-	if (drop_degenerate(m, r, e) || separate_surfaces(m, &group, e))
+	if (drop_degenerate(m, r, e) || clean_separate(m, &group, e))
 		goto done;
 	tolerance = surface_tolerances(m, group, e);
 	id = mem_new(m->vertices, sizeof *id, "vertices", e);

@@ -28,6 +28,19 @@ static int set_sizes(const struct model *m, const struct mesher_options *o,
 	return 0;
 }
 
+/* Surfaces that were divided by merging need vertices of their own again. */
+static int separate_again(struct model *m, uint32_t **position, size_t *places,
+                          struct err *e)
+{
+	uint32_t *group = NULL;
+	int status = clean_separate(m, &group, e);
+
+	free(group);
+	free(*position);
+	*position = status ? NULL : clean_positions(m, places, e);
+	return *position ? 0 : -1;
+}
+
 static int clean(struct model *m, struct mesher_report *r, struct err *e)
 {
 	size_t places, given = m->triangles;
@@ -43,6 +56,7 @@ static int clean(struct model *m, struct mesher_report *r, struct err *e)
 		             : err_set(e, "there is no geometry: no triangles in the scene");
 	position = clean_positions(m, &places, e);
 	int status = position && !drop_duplicates(m, position, r, e) &&
+	             (!r->merged || !separate_again(m, &position, &places, e)) &&
 	             !check_closed(m, position, places, r, e) ? 0 : -1;
 	free(position);
 	return status;
@@ -119,12 +133,26 @@ static void report_patches(const struct model *m, struct mesher_report *r)
 	}
 }
 
+/* Stages of about equal length. */
+static void tell(const struct mesher_options *o, int stage)
+{
+	if (o->progress && o->progress->fn)
+		o->progress->fn(o->progress->arg, stage, 4);
+}
+
 int mesher_run(struct model *m, const struct mesher_options *o, struct mesher_report *r,
                struct err *e)
 {
-	if (clean(m, r, e) || set_sizes(m, o, r, e) || subdivide(m, r->element_size, e) ||
-	    make_patches(m, o, r, e) || model_derive(m, e) ||
-	    outline_patches(m, &r->planar_patches, e) || report_materials(m, r, e))
+	if (clean(m, r, e) || set_sizes(m, o, r, e))
+		return -1;
+	tell(o, 1);
+	if (subdivide(m, r->element_size, e))
+		return -1;
+	tell(o, 2);
+	if (make_patches(m, o, r, e) || model_derive(m, e))
+		return -1;
+	tell(o, 3);
+	if (outline_patches(m, &r->planar_patches, e) || report_materials(m, r, e))
 		return -1;
 	report_patches(m, r);
 	return 0;

@@ -8,6 +8,7 @@
 #define TWOPASS_MESHER_H
 
 #include "model.h"
+#include "par.h"
 
 /* A length in metres or, if relative, as a fraction of the diagonal of the
  * scene's bounding box; INFINITY = no bound. */
@@ -21,6 +22,7 @@ struct mesher_options {
 	struct mesher_size element;  /* longest edge of an element */
 	double normal_cone;          /* degrees: how far the elements of a grouped
 	                                patch may turn away from its mean normal */
+	const struct progress *progress; /* or NULL */
 };
 
 /* What cleaning did to one surface. */

@@ -35,6 +35,10 @@ void scene_box(const struct model *m, double lo[3], double hi[3]);
  * welds them. Vertices keep their order. */
 int clean_model(struct model *m, struct mesher_report *r, struct err *e);
 
+/* A vertex of its own for each surface that uses it, in the order of the old
+ * ones; group[v] becomes the surface of new vertex v, to be freed in any case. */
+int clean_separate(struct model *m, uint32_t **group, struct err *e);
+
 /* Removes the triangles with keep[t] = 0 from all triangle arrays. */
 void clean_compact(struct model *m, const uint8_t *keep);
 

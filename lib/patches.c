@@ -115,16 +115,23 @@ static int push_connected(struct divider *d, uint32_t begin, uint32_t end,
 	return 0;
 }
 
-/* Divides a piece at centroid . axis = at; lo and hi are the boxes' new bounds
- * along the axis. */
+/* Rounding along an axis of a piece: centroids on a cut go to its upper side
+ * however the scene is turned and scaled. */
+static double slack(const struct piece *p, int axis)
+{
+	return 1e-9 * (p->hi[axis] - p->lo[axis]);
+}
+
+/* Divides a piece, and its box, at centroid . axis = at. */
 static int cut(struct divider *d, const struct piece *p, int axis, double at)
 {
 	struct piece low = *p, high = *p;
+	double above_from = at - slack(p, axis);
 	uint32_t n = p->begin, above = p->begin;
 
 	for (uint32_t i = p->begin; i < p->end; i++)
 		if (v3_dot(&d->centroid[3 * (size_t)d->order[i]],
-		           d->region[p->region].axis[axis]) >= at)
+		           d->region[p->region].axis[axis]) >= above_from)
 			d->queue[above++] = d->order[i];
 		else
 			d->order[n++] = d->order[i];
@@ -205,12 +212,12 @@ static int cut_bend(struct divider *d, const struct piece *p)
 
 	for (int k = 0; k < 3; k++) {
 		struct bend b = measure_bend(d, p, k);
-		if (b.hi > b.lo && (axis < 0 || b.score > best.score * (1 + 1e-6))) {
+		if (b.hi - b.lo > 4 * slack(p, k) && (axis < 0 || b.score > best.score * (1 + 1e-6))) {
 			best = b;
 			axis = k;
 		}
 	}
-	if (axis >= 0 && .5 * (best.lo + best.hi) > best.lo)
+	if (axis >= 0)
 		return cut(d, p, axis, .5 * (best.lo + best.hi));
 	/* All centroids coincide: any halves will do. */
 	uint32_t middle = p->begin + (p->end - p->begin) / 2;

@@ -77,14 +77,15 @@ static void triangle_areas(struct finder *f)
 	}
 }
 
-/* Marks the plane pieces that reach further than `reach` from their centroid.
- * sum: zeroed scratch space [triangles][4]. */
-static void mark_large(struct finder *f, double reach, double *sum)
+/* Marks the plane pieces wider than `width`: their area over twice their reach
+ * from the centroid. sum: zeroed scratch space [triangles][5]: weighted centroid,
+ * area, reach. */
+static void mark_large(struct finder *f, double width, double *sum)
 {
 	const struct model *m = f->m;
 
 	for (uint32_t t = 0; t < m->triangles; t++) {
-		double *s = &sum[4 * (size_t)sets_find(f->plane, t)];
+		double *s = &sum[5 * (size_t)sets_find(f->plane, t)];
 		double weight = v3_length(&f->area[3 * (size_t)t]) / 3;
 		for (size_t k = 0; k < 3; k++)
 			v3_mad(s, weight, &m->vertex[3 * (size_t)m->triangle[3 * (size_t)t + k]],
@@ -92,15 +93,15 @@ static void mark_large(struct finder *f, double reach, double *sum)
 		s[3] += 3 * weight;
 	}
 	for (uint32_t t = 0; t < m->triangles; t++) {
-		uint32_t root = sets_find(f->plane, t);
-		const double *s = &sum[4 * (size_t)root];
+		double *s = &sum[5 * (size_t)sets_find(f->plane, t)], d[3];
 		for (size_t k = 0; k < 3; k++) {
-			double d[3];
 			v3_mad(&m->vertex[3 * (size_t)m->triangle[3 * (size_t)t + k]], -1 / s[3],
 			       s, d);
-			f->large[root] |= v3_length(d) > reach;
+			s[4] = fmax(s[4], v3_length(d));
 		}
 	}
+	for (size_t t = 0; t < m->triangles; t++)
+		f->large[t] = sum[5 * t + 3] > 2 * width * sum[5 * t + 4];
 }
 
 /* Numbers the sets in order of their lowest triangle. */
@@ -213,7 +214,7 @@ int find_regions(const struct model *m, double size, double cos_cone, uint32_t *
 	size_t n = m->triangles;
 	double lo[3], hi[3], diagonal[3];
 	struct finder f = { .m = m, .cos_cone = cos_cone };
-	double *sum = mem_new(n, 4 * sizeof *sum, "regions", e);
+	double *sum = mem_new(n, 5 * sizeof *sum, "regions", e);
 
 	f.area = mem_new(n, 3 * sizeof *f.area, "regions", e);
 	f.plane = sets_new(n, e);
@@ -227,7 +228,7 @@ int find_regions(const struct model *m, double size, double cos_cone, uint32_t *
 	f.noise = 0x1p-23 * v3_length(diagonal);
 	triangle_areas(&f);
 	for_neighbours(&f, join_coplanar);
-	/* Large: about half a patch across, or 5 % of a scene without patch size. */
+	/* Large: some third of a patch across, or of a tenth of the scene. */
 	mark_large(&f, .25 * fmin(size, .1 * v3_length(diagonal)), sum);
 	memcpy(f.region, f.plane, n * sizeof *f.region);
 	for_neighbours(&f, join_smooth);

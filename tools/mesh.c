@@ -1,0 +1,419 @@
+/* mesh: from a glTF scene to elements and patches. */
+#include <getopt.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "../formats/digest.h"
+#include "../formats/gltf_file.h"
+#include "../formats/history.h"
+#include "../formats/mesh_file.h"
+#include "../lib/mesher.h"
+#include "common/cli.h"
+
+#define FORMAT "twopass.mesh"
+
+enum { OPT_CONE = 256, OPT_DIRECTIONAL, OPT_EXPONENT, OPT_LOBE, OPT_BANDS, OPT_CLAMP };
+
+static const struct cli_option options[] = {
+	{ 'o', "output", "FILE", "write the mesh to FILE (.mesh; - is standard output)" },
+	{ 'p', "patch-size", "SIZE", "longest side of a patch: metres, 5% of the scene, inf (default 5%)" },
+	{ 'e', "element-size", "SIZE", "longest edge of an element (default 4%, at most the patch size)" },
+	{ OPT_CONE, "normal-cone", "DEG", "how far normals in a curved patch may turn (default 20)" },
+	{ OPT_DIRECTIONAL, "min-directional", "X", "fold derived lobes below this share into diffuse (default .05)" },
+	{ OPT_EXPONENT, "min-exponent", "K", "fold derived lobes of lower exponent into diffuse (default 2)" },
+	{ OPT_LOBE, "lobe", "KIND", "what exponents mean: paper (default) or reciprocal" },
+	{ OPT_BANDS, "bands", "N", "number of bands (default: 1 for a grey scene, else 3)" },
+	{ OPT_CLAMP, "clamp", NULL, "rescale materials that return more than they receive" },
+	{ 0, NULL, NULL, NULL }
+};
+
+struct request {
+	const char *scene, *output;
+	struct mesher_options mesher;
+	struct gltf_options gltf;
+};
+
+struct job {
+	struct cli *cli;
+	const struct request *r;
+	struct model m;
+	struct gltf_report gltf;
+	struct mesher_report mesher;
+	struct cache_info info;
+};
+
+/* A length in metres, in percent of the scene, or `inf`. */
+static struct mesher_size parse_size(const struct cli *c, const char *option, char *text)
+{
+	size_t n = strlen(text);
+	struct mesher_size s = { 0, n > 0 && text[n - 1] == '%' };
+
+	if (s.relative)
+		text[n - 1] = 0;
+	s.value = cli_number(c, option, text, 0, INFINITY);
+	if (s.relative)
+		text[n - 1] = '%';
+	if (s.value == 0)
+		cli_usage(c, "%s: a size must be greater than 0", option);
+	if (s.relative)
+		s.value /= 100;
+	return s;
+}
+
+static enum lobe_kind parse_lobe(const struct cli *c, const char *text)
+{
+	if (strcmp(text, "paper") == 0)
+		return LOBE_PAPER;
+	if (strcmp(text, "reciprocal") != 0)
+		cli_usage(c, "--lobe: '%s' is neither paper nor reciprocal", text);
+	return LOBE_RECIPROCAL;
+}
+
+/* The default element size, but no more than the patch size where that is known
+ * to be smaller. */
+static struct mesher_size default_element(struct mesher_size patch)
+{
+	struct mesher_size usual = { .04, 1 };
+
+	return patch.relative && patch.value > usual.value ? usual : patch;
+}
+
+static void parse(struct cli *c, int argc, char **argv, struct request *r)
+{
+	int letter, element_given = 0;
+
+	r->mesher = (struct mesher_options){ { .05, 1 }, { 0, 0 }, 20, NULL };
+	r->gltf = GLTF_OPTIONS_DEFAULT;
+	while ((letter = cli_next(c, argc, argv)) != -1) {
+		switch (letter) {
+		case 'o': r->output = optarg; break;
+		case 'p': r->mesher.patch = parse_size(c, "--patch-size", optarg); break;
+		case 'e':
+			r->mesher.element = parse_size(c, "--element-size", optarg);
+			element_given = 1;
+			break;
+		case OPT_CONE:
+			r->mesher.normal_cone = cli_number(c, "--normal-cone", optarg, 0, 80);
+			break;
+		case OPT_DIRECTIONAL:
+			r->gltf.min_directional = cli_number(c, "--min-directional", optarg, 0, 1);
+			break;
+		case OPT_EXPONENT:
+			r->gltf.min_exponent = cli_number(c, "--min-exponent", optarg, 0, INFINITY);
+			break;
+		case OPT_LOBE: r->gltf.lobe = parse_lobe(c, optarg); break;
+		case OPT_BANDS:
+			r->gltf.bands = (int)cli_integer(c, "--bands", optarg, 1, BANDS_MAX);
+			break;
+		case OPT_CLAMP: r->gltf.clamp = 1; break;
+		}
+	}
+	if (argc - optind != 1)
+		cli_usage(c, "one glTF file is needed");
+	if (!r->output)
+		cli_usage(c, "an output is needed: -o FILE.mesh");
+	if (!element_given)
+		r->mesher.element = default_element(r->mesher.patch);
+	r->scene = argv[optind];
+}
+
+/* ---- options and report as JSON ---- */
+
+static char *dump(json_t *object, struct err *e)
+{
+	char *text = object ? json_dumps(object, JSON_COMPACT | JSON_REAL_PRECISION(17)) : NULL;
+
+	json_decref(object);
+	if (!text)
+		err_set(e, "out of memory for options and report");
+	return text;
+}
+
+/* JSON knows no infinity. */
+static json_t *length_json(double x)
+{
+	return isfinite(x) ? json_real(x) : json_string("inf");
+}
+
+static json_t *size_json(struct mesher_size s)
+{
+	return json_pack("{s:o, s:s}", "value", length_json(s.value), "of",
+	                 s.relative ? "scene" : "metre");
+}
+
+static char *options_text(const struct request *r, struct err *e)
+{
+	return dump(json_pack("{s:o, s:o, s:f, s:f, s:o, s:s, s:i, s:b}",
+	                      "patch_size", size_json(r->mesher.patch),
+	                      "element_size", size_json(r->mesher.element),
+	                      "normal_cone", r->mesher.normal_cone,
+	                      "min_directional", r->gltf.min_directional,
+	                      "min_exponent", length_json(r->gltf.min_exponent),
+	                      "lobe", r->gltf.lobe == LOBE_PAPER ? "paper" : "reciprocal",
+	                      "bands", r->gltf.bands, "clamp", r->gltf.clamp), e);
+}
+
+static json_t *notes_json(const struct gltf_report *r)
+{
+	json_t *list = json_array();
+
+	for (size_t i = 0; i < r->notes; i++)
+		json_array_append_new(list, json_string(r->note[i]));
+	return list;
+}
+
+static json_t *cleaned_json(const struct mesher_surface *s)
+{
+	return json_pack("{s:I, s:I, s:I, s:I}", "degenerate", (json_int_t)s->degenerate,
+	                 "duplicate", (json_int_t)s->duplicate,
+	                 "welded", (json_int_t)s->welded,
+	                 "opposite_winding", (json_int_t)s->opposite);
+}
+
+/* What was cleaned where, surfaces without anything left out. */
+static json_t *surfaces_json(const struct job *j)
+{
+	static const struct mesher_surface clean;
+	json_t *object = json_object();
+
+	for (size_t i = 0; i < j->mesher.surfaces; i++)
+		if (memcmp(&j->mesher.surface[i], &clean, sizeof clean))
+			json_object_set_new(object, j->m.surface.name[i],
+			                    cleaned_json(&j->mesher.surface[i]));
+	return object;
+}
+
+static json_t *materials_json(const struct mesher_report *r)
+{
+	return json_pack("{s:I, s:I, s:I, s:I, s:I, s:I}", "used", (json_int_t)r->materials,
+	                 "two_sided", (json_int_t)r->two_sided,
+	                 "emitters", (json_int_t)r->emitters, "lobes", (json_int_t)r->lobes,
+	                 "ideal", (json_int_t)r->ideal,
+	                 "transmitting", (json_int_t)r->transmitting);
+}
+
+static json_t *pieces_json(const struct mesher_report *r)
+{
+	return json_pack("{s:I, s:I, s:I, s:I}", "connected", (json_int_t)r->components,
+	                 "closed", (json_int_t)r->closed_components,
+	                 "open_edges", (json_int_t)r->open_edges,
+	                 "crowded_edges", (json_int_t)r->crowded_edges);
+}
+
+static char *report_text(const struct job *j, struct err *e)
+{
+	const struct mesher_report *r = &j->mesher;
+
+	return dump(json_pack("{s:i, s:o, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:o, s:o, s:f, s:f,"
+	                      " s:o, s:I, s:o, s:o, s:o}",
+	                      "bands", j->m.bands, "materials", materials_json(r),
+	                      "surfaces", (json_int_t)j->m.surface.n,
+	                      "triangles", (json_int_t)j->m.triangles,
+	                      "elements", (json_int_t)j->m.elements,
+	                      "patches", (json_int_t)j->m.patches,
+	                      "planar_patches", (json_int_t)r->planar_patches,
+	                      "largest_patch", (json_int_t)r->largest_patch,
+	                      "diagonal", r->diagonal,
+	                      "patch_size", length_json(r->patch_size),
+	                      "element_size", length_json(r->element_size),
+	                      "area_front", r->area_front, "area_back", r->area_back,
+	                      "cleaned", cleaned_json(&r->total),
+	                      "merged", (json_int_t)r->merged,
+	                      "cleaned_surfaces", surfaces_json(j),
+	                      "pieces", pieces_json(r), "notes", notes_json(&j->gltf)), e);
+}
+
+/* Equal keys, equal output: program, options, content of the scene's files. */
+static char *make_key(const struct job *j)
+{
+	char hex[33];
+	struct digest *d = digest_new();
+
+	digest_string(d, "mesh " TWOPASS_VERSION " " CACHE_VERSION);
+	digest_string(d, j->info.options);
+	digest_string(d, j->gltf.digest);
+	digest_end(d, hex);
+	return strdup(hex);
+}
+
+/* ---- the report for people ---- */
+
+static const char *plural(size_t n)
+{
+	return n == 1 ? "" : "s";
+}
+
+static void print_size(FILE *f, const char *what, double metres)
+{
+	if (isfinite(metres))
+		fprintf(f, ", %s up to %.4g m", what, metres);
+	fputc('\n', f);
+}
+
+static void print_counts(FILE *f, const struct job *j)
+{
+	const struct mesher_report *r = &j->mesher;
+	const struct model *m = &j->m;
+
+	fprintf(f, "scene       %zu surface%s, %zu camera%s, %.6g m across\n", m->surface.n,
+	        plural(m->surface.n), m->cameras, plural(m->cameras), r->diagonal);
+	fprintf(f, "triangles   %zu", m->triangles);
+	if (r->total.degenerate)
+		fprintf(f, ", %u without area dropped", r->total.degenerate);
+	if (r->total.duplicate)
+		fprintf(f, ", %u coincident dropped", r->total.duplicate);
+	if (r->total.welded)
+		fprintf(f, ", %u vertices welded", r->total.welded);
+	fprintf(f, "\nelements    %zu", m->elements);
+	print_size(f, "edges", r->element_size);
+	fprintf(f, "patches     %zu, %zu of them plane", m->patches, r->planar_patches);
+	print_size(f, "sides", r->patch_size);
+	fprintf(f, "area        %.6g m2 front, %.6g m2 back\n", r->area_front, r->area_back);
+	fprintf(f, "closed      %zu of %zu connected piece%s; %zu open edge%s, %zu with more than "
+	        "two triangles\n", r->closed_components, r->components, plural(r->components),
+	        r->open_edges, plural(r->open_edges), r->crowded_edges);
+}
+
+static void print_modelled(FILE *f, const struct job *j)
+{
+	const struct mesher_report *r = &j->mesher;
+	const struct model *m = &j->m;
+
+	fprintf(f, "materials   %zu: %zu emit, %zu two-sided, %zu transmit, %zu with lobes, "
+	        "%zu ideal\n", r->materials, r->emitters, r->two_sided, r->transmitting, r->lobes,
+	        r->ideal);
+	fprintf(f, "bands       %d%s\n", m->bands,
+	        m->bands > 1 ? "" : j->r->gltf.bands ? "" : ": the scene is grey");
+	if (r->lobes)
+		fprintf(f, "lobes       %s\n",
+		        m->lobe == LOBE_PAPER ? "paper" : "reciprocal");
+	fprintf(f, "left out    ");
+	int any = 0;
+	if (r->two_sided < r->materials)
+		fprintf(f, "%sbacks of %zu one-sided material%s", any++ ? "; " : "",
+		        r->materials - r->two_sided, plural(r->materials - r->two_sided));
+	if (!r->lobes && !r->ideal)
+		fprintf(f, "%sdirections: no material is directional", any++ ? "; " : "");
+	if (j->gltf.skipped)
+		fprintf(f, "%s%zu primitive%s of points and lines", any++ ? "; " : "",
+		        j->gltf.skipped, plural(j->gltf.skipped));
+	fprintf(f, "%s\n", any ? "" : "nothing");
+	for (size_t i = 0; i < j->gltf.notes; i++)
+		fprintf(f, "note        %s\n", j->gltf.note[i]);
+}
+
+/* Every surface that lost triangles or whose winding is mixed. */
+static void warn_surfaces(const struct job *j)
+{
+	const struct mesher_report *r = &j->mesher;
+
+	for (size_t i = 0; i < r->surfaces; i++) {
+		const char *name = j->m.surface.name[i];
+		const struct mesher_surface *s = &r->surface[i];
+		if (s->degenerate)
+			cli_note(j->cli, "%s: %s: dropped %u triangle%s without area", j->r->scene,
+			         name, s->degenerate, plural(s->degenerate));
+		if (s->opposite)
+			cli_warn(j->cli, "%s: %s: neighbouring triangles with opposite winding at "
+			         "%u edge%s; check which side is the front", j->r->scene, name,
+			         s->opposite, plural(s->opposite));
+		if (s->duplicate)
+			cli_detail(j->cli, "%s: %s: dropped %u coincident triangle%s", j->r->scene,
+			           name, s->duplicate, plural(s->duplicate));
+	}
+	if (r->total.duplicate)
+		cli_warn(j->cli, "%s: dropped %u triangle%s that coincide with others; kept the "
+		         "first of each place%s", j->r->scene, r->total.duplicate,
+		         plural(r->total.duplicate),
+		         r->merged ? ", with the other's front for its back" : "");
+}
+
+/* ---- the run ---- */
+
+static int is_stdout(const struct job *j)
+{
+	return strcmp(j->r->output, "-") == 0;
+}
+
+/* Errors of the mesher name no file, as it knows none. */
+static int divide(struct job *j, struct err *e)
+{
+	struct cli_progress bar;
+	struct progress progress = cli_progress_begin(&bar, j->cli, "meshing");
+	struct mesher_options o = j->r->mesher;
+	struct err inner = { 0 };
+
+	o.progress = &progress;
+	int status = mesher_run(&j->m, &o, &j->mesher, &inner);
+	cli_progress_end(&bar);
+	return status ? err_set(e, "%s: %s", j->r->scene, inner.text) : 0;
+}
+
+static int write_mesh(struct job *j, int argc, char **argv, struct err *e)
+{
+	j->info.report = report_text(j, e);
+	j->info.history = history_append(NULL, argc, argv, e);
+	if (!j->info.report || !j->info.history)
+		return -1;
+	cache_ids(&j->m, &j->info);
+	return mesh_file_write(j->r->output, &j->m, &j->info, e);
+}
+
+static void print_report(const struct job *j)
+{
+	FILE *f = is_stdout(j) ? stderr : stdout;
+
+	if (j->cli->quiet)
+		return;
+	print_counts(f, j);
+	print_modelled(f, j);
+}
+
+static int work(struct job *j, int argc, char **argv, struct err *e)
+{
+	double begun = cli_seconds();
+
+	if (gltf_file_read(j->r->scene, &j->r->gltf, &j->m, &j->gltf, e))
+		return -1;
+	for (size_t i = 0; i < j->gltf.notes; i++)
+		cli_note(j->cli, "%s: %s", j->r->scene, j->gltf.note[i]);
+	j->info.options = options_text(j->r, e);
+	if (!j->info.options || !(j->info.key = make_key(j)))
+		return err_set(e, "out of memory for options");
+	if (!is_stdout(j) && cache_up_to_date(j->r->output, FORMAT, j->info.key)) {
+		cli_note(j->cli, "%s: up to date", j->r->output);
+		return 0;
+	}
+	if (divide(j, e))
+		return -1;
+	warn_surfaces(j);
+	if (write_mesh(j, argc, argv, e))
+		return -1;
+	print_report(j);
+	cli_detail(j->cli, "%s: %.2f s, %.0f MB", j->r->output, cli_seconds() - begun,
+	           cli_peak_megabytes());
+	return 0;
+}
+
+int main(int argc, char **argv)
+{
+	struct cli c = { .program = "mesh", .synopsis = "[OPTION]... SCENE.gltf -o FILE.mesh",
+		         .about = "Reads a glTF scene, cleans it, and divides its surfaces into "
+		                  "elements and patches.",
+		         .options = options, .uses_threads = 1 };
+	struct request r = { 0 };
+	struct job j = { .cli = &c, .r = &r };
+	struct err e = { 0 };
+
+	cli_signals();
+	parse(&c, argc, argv, &r);
+	int status = work(&j, argc, argv, &e) ? cli_fail(&c, &e) : 0;
+	mesher_report_free(&j.mesher);
+	gltf_report_free(&j.gltf);
+	cache_info_free(&j.info);
+	model_free(&j.m);
+	return cli_finish(&c, status);
+}
