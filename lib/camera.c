@@ -40,20 +40,20 @@ static int no_such_camera(const struct model *m, const char *name, struct err *e
 	size_t at = 0;
 
 	if (!m->cameras)
-		return err_set(e, "no camera '%s': the scene has none; "
-		               "give a view by --eye and --target", name);
+		return err_set(e, "the scene has no cameras; give a view by --eye and --target");
 	for (size_t i = 0; i < m->cameras && at < sizeof list; i++) {
 		int n = snprintf(list + at, sizeof list - at, "%s%s", i ? ", " : "",
 		                 m->camera[i].name);
 		at += n > 0 ? (size_t)n : 0;
 	}
-	return err_set(e, "no camera '%s'; there are: %s%s", name, list,
+	return err_set(e, "%s%s%s; there are: %s%s", name ? "no camera '" : "choose a camera",
+	               name ? name : "", name ? "'" : "", list,
 	               at < sizeof list ? "" : "...");
 }
 
 int camera_find(const struct model *m, const char *name, struct err *e)
 {
-	for (size_t i = 0; i < m->cameras; i++)
+	for (size_t i = 0; name && i < m->cameras; i++)
 		if (strcmp(m->camera[i].name, name) == 0)
 			return (int)i;
 	return no_such_camera(m, name, e);
@@ -77,16 +77,19 @@ int camera_frame(const struct camera *c, int width, int height, struct view_fram
 
 	*f = (struct view_frame){ .width = width, .height = (int)h,
 	                          .orthographic = c->orthographic };
-	memcpy(f->right, c->to_world, sizeof f->right);
 	memcpy(f->up, c->to_world + 4, sizeof f->up);
 	for (int k = 0; k < 3; k++)
 		f->forward[k] = -c->to_world[8 + k];
 	memcpy(f->eye, c->to_world + 12, sizeof f->eye);
-	double r = v3_normalise(f->right), u = v3_normalise(f->up);
 	double l = v3_normalise(f->forward);
+	v3_cross(f->forward, f->up, f->right);
+	double r = v3_normalise(f->right);
+	v3_cross(f->right, f->forward, f->up);
 	f->half_y = c->orthographic ? fabs(c->ymag) : tan(c->yfov / 2);
 	f->half_x = f->half_y * width / h;
-	if (!(r > 0 && u > 0 && l > 0 && f->half_x > 0 && isfinite(r + u + l + f->half_x)))
+	f->step_x = 2 * f->half_x / width;
+	f->step_y = 2 * f->half_y / h;
+	if (!(r > 0 && l > 0 && f->half_x > 0 && isfinite(r + l + f->half_x)))
 		return err_set(e, "camera '%s' has no usable field of view or orientation",
 		               c->name ? c->name : "");
 	return 0;
@@ -95,16 +98,22 @@ int camera_frame(const struct camera *c, int width, int height, struct view_fram
 void camera_ray(const struct view_frame *f, double x, double y, double org[3],
                 double dir[3])
 {
-	double sx = (2 * x / f->width - 1) * f->half_x;
-	double sy = (1 - 2 * y / f->height) * f->half_y;
+	double sx = x * f->step_x - f->half_x, sy = f->half_y - y * f->step_y;
+	double across[3];
 
-	for (int k = 0; k < 3; k++) {
-		double across = sx * f->right[k] + sy * f->up[k];
-		org[k] = f->eye[k] + (f->orthographic ? across : 0);
-		dir[k] = f->forward[k] + (f->orthographic ? 0 : across);
+	for (int k = 0; k < 3; k++)
+		across[k] = sx * f->right[k] + sy * f->up[k];
+	if (f->orthographic) {
+		v3_mad(f->eye, 1, across, org);
+		memcpy(dir, f->forward, sizeof f->forward);
+		return;
 	}
-	if (!f->orthographic)
-		v3_normalise(dir);
+	/* The axes are orthonormal; one division, for this runs for every pixel. */
+	double scale = 1 / sqrt(1 + sx * sx + sy * sy);
+	for (int k = 0; k < 3; k++) {
+		org[k] = f->eye[k];
+		dir[k] = scale * (f->forward[k] + across[k]);
+	}
 }
 
 double camera_depth(const struct view_frame *f, const double point[3])

@@ -19,13 +19,15 @@ struct view_frame {
 	double right[3], up[3], forward[3]; /* unit vectors, world */
 	double half_x, half_y;              /* half extents: metres for orthographic
 	                                       cameras, tangents for perspective ones */
+	double step_x, step_y;              /* the same units for one pixel */
 };
 
 /* Parses "WxH", or "W" (height 0: from the camera's aspect). 0, or -1 when text is
  * neither or out of [1, CAMERA_SIZE_MAX]. */
 int camera_parse_size(const char *text, int *width, int *height);
 
-/* Index of the camera called `name` in m, or -1 and e, which lists those there are. */
+/* Index of the camera called `name` in m, or -1 and e, which lists those there are
+ * (with a NULL name, asking for one of them). */
 int camera_find(const struct model *m, const char *name, struct err *e);
 
 /* Sets up c's view of width x height pixels; 0 for width means CAMERA_WIDTH, 0 for

@@ -34,15 +34,14 @@ int reconstruct(const struct model *m, const struct solution *s, int threads,
                 struct reconstruction *r, struct err *e);
 void reconstruction_free(struct reconstruction *r);
 
-/* H of both sides at the point of `element` with corner weights w, into
- * h[2 sides][bands]. */
+/* H of one side at the point of `element` with corner weights w, into h[bands]. */
 static inline void reconstruction_at(const struct reconstruction *r, size_t element,
-                                     const double w[3], double *h)
+                                     int side, const double w[3], double *h)
 {
-	size_t n = 2 * (size_t)r->bands;
-	const float *c = r->corner + 3 * n * element;
+	size_t bands = (size_t)r->bands, n = 2 * bands;
+	const float *c = r->corner + 3 * n * element + (size_t)side * bands;
 
-	for (size_t i = 0; i < n; i++) {
+	for (size_t i = 0; i < bands; i++) {
 		double v = w[0] * (double)c[i] + w[1] * (double)c[n + i] +
 		           w[2] * (double)c[2 * n + i];
 		h[i] = v > 0 ? v : 0; /* weights may be negative by rounding */

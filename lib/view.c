@@ -56,6 +56,7 @@ static void tabulate_side(const struct materials *mt, size_t material, int side,
 	for (int b = 0; b < mt->bands; b++) {
 		s->here[b] = mt->rho_d[here + (size_t)b] / pi;
 		s->across[b] = mt->tau_d[across + (size_t)b] / pi;
+		s->translucent |= s->across[b] > 0;
 		s->emits |= mt->emission[here + (size_t)b] > 0;
 	}
 	s->reflected = lobe_of(&mt->rho_s[here], mt->bands,
@@ -235,7 +236,8 @@ static void store_first(const struct render *r, size_t pixel, double x, double y
 		      seen ? r->v->m->element_patch[first.element] : -1.);
 }
 
-static void trace_pixel(const struct render *r, struct view_walker *w, int i, int j)
+static void trace_pixel(const struct render *r, struct view_walker *w,
+                        struct view_branch *b, int i, int j)
 {
 	uint64_t id = (uint64_t)j * (uint64_t)r->f->width + (uint64_t)i, seed = rng_mix(id);
 	int bands = r->v->m->bands, n = r->o->samples;
@@ -247,20 +249,23 @@ static void trace_pixel(const struct render *r, struct view_walker *w, int i, in
 	memset(w->directional, 0, (size_t)bands * sizeof *w->directional);
 	memset(w->emission, 0, (size_t)bands * sizeof *w->emission);
 	for (int s = 0; s < n; s++) {
-		double org[3], dir[3], x = r->spot[s][0] + dx, y = r->spot[s][1] + dy;
-		camera_ray(r->f, i + (x < 1 ? x : x - 1), j + (y < 1 ? y : y - 1), org, dir);
-		view_follow(w, org, dir, (uint32_t)s, seed);
+		double x = r->spot[s][0] + dx, y = r->spot[s][1] + dy;
+		camera_ray(r->f, i + (x < 1 ? x : x - 1), j + (y < 1 ? y : y - 1), b->org,
+		           b->dir);
+		b->index = (uint32_t)s;
+		b->seed = seed;
+		view_follow(w, b);
 	}
-	double total[BANDS_MAX];
-	for (int b = 0; b < bands; b++) {
-		w->diffuse[b] /= n;
-		w->directional[b] /= n;
-		w->emission[b] /= n;
-		total[b] = w->diffuse[b] + w->directional[b] + w->emission[b];
+	double total[BANDS_MAX], share = 1. / n;
+	for (int k = 0; k < bands; k++) {
+		w->diffuse[k] *= share;
+		w->directional[k] *= share;
+		w->emission[k] *= share;
+		total[k] = w->diffuse[k] + w->directional[k] + w->emission[k];
 	}
 	store_colour(r, 0, id, total);
-	for (int b = 0; b < bands && r->at.bands >= 0; b++)
-		store(r, r->at.bands + b, id, total[b]);
+	for (int k = 0; k < bands && r->at.bands >= 0; k++)
+		store(r, r->at.bands + k, id, total[k]);
 	store_colour(r, r->at.diffuse, id, w->diffuse);
 	store_colour(r, r->at.directional, id, w->directional);
 	store_colour(r, r->at.emission, id, w->emission);
@@ -281,6 +286,7 @@ static void trace_tiles(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct render *r = arg;
 	int bands = r->v->m->bands;
+	struct view_branch primary;
 
 	for (size_t t = begin; t < end; t++) {
 		struct view_walker w = { .v = r->v, .o = r->o, .stack = r->stack[thread] };
@@ -288,7 +294,7 @@ static void trace_tiles(void *arg, size_t begin, size_t end, int thread)
 		struct tile_sum sum = { 0 };
 		for (int j = j0; j < j0 + TILE && j < r->f->height; j++)
 			for (int i = i0; i < i0 + TILE && i < r->f->width; i++) {
-				trace_pixel(r, &w, i, j);
+				trace_pixel(r, &w, &primary, i, j);
 				sum.radiance += pixel_radiance(&w, bands);
 			}
 		for (int b = 0; b < bands; b++)

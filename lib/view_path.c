@@ -96,21 +96,24 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b,
 {
 	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
 	size_t bands = (size_t)w->v->m->bands;
-	double h[2 * BANDS_MAX], l[BANDS_MAX];
-	const double *here = h + (p->side == FRONT ? 0 : bands);
-	const double *across = h + (p->side == FRONT ? bands : 0);
+	double h[BANDS_MAX];
 	double *diffuse = b->depth ? w->directional : w->diffuse;
 	double *emission = b->depth ? w->directional : w->emission;
 
-	reconstruction_at(w->v->h, p->element, p->w, h);
+	reconstruction_at(w->v->h, p->element, p->side, p->w, h);
 	for (size_t i = 0; i < bands; i++)
-		diffuse[i] += b->weight[i] * (s->here[i] * here[i] + s->across[i] * across[i]);
+		diffuse[i] += b->weight[i] * s->here[i] * h[i];
+	if (s->translucent) {
+		reconstruction_at(w->v->h, p->element, !p->side, p->w, h);
+		for (size_t i = 0; i < bands; i++)
+			diffuse[i] += b->weight[i] * s->across[i] * h[i];
+	}
 	if (!s->emits)
 		return;
 	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] };
-	bsdf_emission(w->v->m, p->material, p->n, out, l);
+	bsdf_emission(w->v->m, p->material, p->n, out, h);
 	for (size_t i = 0; i < bands; i++)
-		emission[i] += b->weight[i] * l[i];
+		emission[i] += b->weight[i] * h[i];
 }
 
 /* Puts a branch that carries `scale` times `coefficient` of b's weight on the
@@ -223,24 +226,17 @@ static void follow_branch(struct view_walker *w, const struct view_branch *b)
 		branch_off(w, b, &p, &s->transmitted, 1);
 }
 
-void view_follow(struct view_walker *w, const double org[3], const double dir[3],
-                 uint32_t index, uint64_t seed)
+void view_follow(struct view_walker *w, struct view_branch *b)
 {
-	struct view_branch b;
-
-	memcpy(b.org, org, sizeof b.org);
-	memcpy(b.dir, dir, sizeof b.dir);
 	for (int i = 0; i < w->v->m->bands; i++)
-		b.weight[i] = 1;
-	b.depth = b.lobes = 0;
-	b.passes = 1;
-	b.share = 1;
-	b.index = index;
-	b.seed = seed;
-	follow_branch(w, &b);
+		b->weight[i] = 1;
+	b->depth = b->lobes = 0;
+	b->passes = 1;
+	b->share = 1;
+	follow_branch(w, b);
 	while (w->waiting) {
-		b = w->stack[--w->waiting];
-		follow_branch(w, &b);
+		*b = w->stack[--w->waiting];
+		follow_branch(w, b);
 	}
 }
 

@@ -16,7 +16,7 @@ struct view_lobe {
 struct view_side {
 	double here[BANDS_MAX];     /* rho_d / pi of this side */
 	double across[BANDS_MAX];   /* tau_d / pi of the other side */
-	int emits, black;
+	int translucent, emits, black;
 	struct view_lobe reflected, transmitted;
 };
 
@@ -59,10 +59,9 @@ struct view_walker {
 /* Room for the branches that may wait at once. */
 size_t view_stack_size(const struct view_options *o);
 
-/* Follows the camera ray org, dir: adds the radiance it brings to w's parts.
- * first may be NULL. */
-void view_follow(struct view_walker *w, const double org[3], const double dir[3],
-                 uint32_t index, uint64_t seed);
+/* Follows the camera ray b, of which org, dir, index and seed are given, and adds
+ * the radiance it brings to w's parts. b is overwritten. */
+void view_follow(struct view_walker *w, struct view_branch *b);
 
 /* The surface the ray meets first. */
 void view_first_seen(const struct view_scene *v, const double org[3], const double dir[3],

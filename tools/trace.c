@@ -270,8 +270,8 @@ static int list_shots(struct trace *t, struct err *e)
 	}
 	if (t->shots == 0) {
 		struct err why = { 0 };
-		camera_find(m, "", &why);
-		return err_set(e, "%s: a camera is needed (-c); %s", t->rad, why.text);
+		camera_find(m, NULL, &why);
+		return err_set(e, "%s: %s", t->rad, why.text);
 	}
 	return 0;
 }
