@@ -15,32 +15,6 @@ struct tally_arrival {
 	double dir[3];     /* towards the source, weighted */
 };
 
-int tally_init(struct tally *t, const struct model *m, const uint8_t *has_lobe, struct err *e)
-{
-	*t = (struct tally){ .m = m, .has_lobe = has_lobe };
-	if (chains_init(&t->chains, m, e))
-		return -1;
-	t->dense = mem_new(2 * m->elements, sizeof *t->dense, "row tally", e);
-	t->replicate = mem_new(2 * m->patches, sizeof *t->replicate, "row tally", e);
-	t->square = mem_new(2 * m->patches, sizeof *t->square, "row tally", e);
-	t->seen = mem_new(2 * m->patches, 1, "row tally", e);
-	return t->dense && t->replicate && t->square && t->seen ? 0 : -1;
-}
-
-void tally_free(struct tally *t)
-{
-	void *array[] = { t->dense, t->replicate, t->square, t->seen, t->touched.data,
-		t->far.data, t->sort.data, t->rest.data, t->slot_chain.data,
-		t->chain_slot.data, t->arrival.data };
-
-	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
-		free(array[i]);
-	chains_free(&t->chains);
-	*t = (struct tally){ 0 };
-}
-
-/* ---- while a row is cast ---- */
-
 /* Slot of a chain in this row, made if new. */
 static uint32_t slot_of(struct tally *t, uint32_t chain)
 {
@@ -62,6 +36,35 @@ static uint32_t slot_of(struct tally *t, uint32_t chain)
 	}
 	return *slot - 1;
 }
+
+int tally_init(struct tally *t, const struct model *m, const uint8_t *has_lobe, struct err *e)
+{
+	*t = (struct tally){ .m = m, .has_lobe = has_lobe };
+	if (chains_init(&t->chains, m, e))
+		return -1;
+	t->dense = mem_new(2 * m->elements, sizeof *t->dense, "row tally", e);
+	t->replicate = mem_new(2 * m->patches, sizeof *t->replicate, "row tally", e);
+	t->square = mem_new(2 * m->patches, sizeof *t->square, "row tally", e);
+	t->seen = mem_new(2 * m->patches, 1, "row tally", e);
+	if (!t->dense || !t->replicate || !t->square || !t->seen)
+		return -1;
+	slot_of(t, 0); /* chain 0 is slot 0 of every row */
+	return t->err.set ? err_set(e, "%s", t->err.text) : 0;
+}
+
+void tally_free(struct tally *t)
+{
+	void *array[] = { t->dense, t->replicate, t->square, t->seen, t->touched.data,
+		t->far.data, t->sort.data, t->rest.data, t->slot_chain.data,
+		t->chain_slot.data, t->arrival.data };
+
+	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
+		free(array[i]);
+	chains_free(&t->chains);
+	*t = (struct tally){ 0 };
+}
+
+/* ---- while a row is cast ---- */
 
 struct tally_rest *tally_rest(struct tally *t, uint32_t chain)
 {
@@ -342,6 +345,7 @@ static void clear(struct tally *t)
 	t->slot_chain.n = t->rest.n = t->far.n = t->arrival.n = t->touched.n = 0;
 	t->escape_before = t->escape_square = 0;
 	t->replicates = 0;
+	slot_of(t, 0);
 }
 
 static int put_row(struct ff_batch *b, uint32_t side, enum ff_row_kind kind, uint32_t samples,

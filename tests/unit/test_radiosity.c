@@ -1,0 +1,190 @@
+/* Form factors and the solver against closed forms, in memory. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "../../lib/bsdf.h"
+#include "../../lib/radiosity.h"
+#include "grid.h"
+#include "memory_ff.h"
+
+static const double zero[3] = { 0, 0, 0 }, one[3] = { 1, 1, 1 };
+
+static const struct ff_options rays = { .method = FF_RAYS, .rays = 4096, .points = 1,
+	.emitter_gain = 1, .lobe_rays = 4096, .depth = 256, .seed = 1, .part = 1, .parts = 1,
+	.threads = 2 };
+static const struct ff_options cubes = { .method = FF_HEMICUBE, .rays = 64, .points = 16,
+	.emitter_gain = 1, .lobe_rays = 4096, .depth = 256, .seed = 1, .part = 1, .parts = 1,
+	.threads = 2 };
+
+static void set_diffuse(struct model *m, size_t material, double rho, double exitance)
+{
+	struct materials *mt = &m->material;
+
+	mt->one_sided[material] = 1;
+	mt->rho_d[material_at(mt, material, FRONT)] = rho;
+	mt->emission[material_at(mt, material, FRONT)] = exitance / 3.14159265358979323846;
+}
+
+/* Solves; h[i] is the area mean of the irradiance of patch-side side[i]. */
+static void solve(const struct model *m, const struct ff_options *o, const uint32_t *side,
+                  size_t n, double *h)
+{
+	struct ff f;
+	const struct ff *shard[] = { &f };
+	const char *name[] = { "memory" };
+	struct ff_stats stats;
+	struct transport t;
+	struct solution s;
+	struct err e = { 0 };
+	struct radiosity_options ro = { 1e-9, UINT64_MAX, 2 };
+	struct radiosity_report r;
+
+	memory_ff(m, o, &f, &stats);
+	assert_int_equal(transport_init(&t, m, shard, name, 1, 2, &e), 0);
+	assert_int_equal(solution_begin(&s, m, &t, &e), 0);
+	if (radiosity_shoot(&s, &t, &ro, NULL, &r, &e)) {
+		print_error("%s\n", e.text);
+		fail();
+	}
+	assert_int_equal(radiosity_gather(&s, &t, 2, &r, &e), 0);
+	assert_true(r.residual <= 1e-12);
+	for (size_t k = 0; k < n; k++) {
+		uint32_t p = side[k] >> 1;
+		h[k] = 0;
+		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++)
+			h[k] += solution_irradiance(&s, 2 * i + (side[k] & 1), 0) *
+			        m->element_area[i] / m->patch_area[p];
+	}
+	transport_free(&t);
+	solution_free(&s);
+	ff_free(&f);
+}
+
+static void furnace(const struct ff_options *o, double tolerance)
+{
+	struct model m;
+	const uint32_t material[6] = { 0 };
+	const uint32_t side[6] = { 0, 2, 4, 6, 8, 10 };
+	double h[6];
+
+	grid_new(&m, 6, 4, 1, 1);
+	grid_box(&m, 4, material, zero, one);
+	set_diffuse(&m, 0, .5, 1);
+	grid_end(&m);
+	solve(&m, o, side, 6, h);
+	for (int k = 0; k < 6; k++)
+		assert_true(fabs(h[k] - 2) < tolerance);
+	model_free(&m);
+}
+
+static void furnace_by_rays(void **state)
+{
+	(void)state;
+	furnace(&rays, .05);
+}
+
+static void furnace_by_hemicubes(void **state)
+{
+	(void)state;
+	furnace(&cubes, .05);
+}
+
+/* A mirror-walled box is a pair of infinite plates: H_ceiling = E / (1 - rho^2). */
+static void plates(const struct ff_options *o, double lobe_exponent, double tolerance)
+{
+	struct model m;
+	const uint32_t material[6] = { 0, 0, 0, 0, 1, 2 };
+	const double at[3] = { 0, 0, .5 }, x[3] = { 1, 0, 0 }, y[3] = { 0, 1, 0 };
+	struct materials *mt = &m.material;
+
+	grid_new(&m, 7, 2, 4, 1);
+	grid_box(&m, 2, material, zero, one);
+	grid_quad(&m, 2, 3, at, x, y);
+	for (size_t k = 0; k < 3; k++)
+		set_diffuse(&m, k, k == 0 ? 0 : k == 1 ? .5 : .4, k == 1);
+	mt->rho_s[material_at(mt, 0, FRONT)] = 1;
+	const double front[4] = { .1, .15, .25, .4 }, back[4] = { .2, .1, .25, .4 };
+	double *coefficient[4] = { mt->rho_d, mt->tau_d, mt->rho_s, mt->tau_s };
+	for (int k = 0; k < 4; k++) {
+		coefficient[k][material_at(mt, 3, FRONT)] = front[k];
+		coefficient[k][material_at(mt, 3, BACK)] = back[k];
+	}
+	for (int s = 0; s < 2; s++)
+		mt->alpha[6 + s] = mt->beta[6 + s] = lobe_exponent;
+	grid_end(&m);
+	const double expected[4] = { 1.4063777596075226, .3270645952575634, .8127555192150451,
+		.8176614881439084 };
+	const uint32_t side[4] = { 2 * 6 + 1, 2 * 6, 2 * 4, 2 * 5 };
+	double h[4];
+	solve(&m, o, side, 4, h);
+	for (int k = 0; k < 4; k++) {
+		if (!(fabs(h[k] / expected[k] - 1) < tolerance))
+			print_error("exponent %g: %g for %g\n", lobe_exponent, h[k], expected[k]);
+		assert_true(fabs(h[k] / expected[k] - 1) < tolerance);
+	}
+	model_free(&m);
+}
+
+static void plates_by_rays(void **state)
+{
+	(void)state;
+	plates(&rays, (double)INFINITY, .01);
+	plates(&rays, 1, .01);
+	plates(&rays, 10, .01);
+}
+
+static void plates_by_hemicubes(void **state)
+{
+	(void)state;
+	plates(&cubes, (double)INFINITY, .01);
+	plates(&cubes, 1, .01);
+	plates(&cubes, 10, .01);
+}
+
+static void white_box_has_no_steady_state(void **state)
+{
+	struct model m;
+	const uint32_t material[6] = { 0 };
+	struct ff f;
+	const struct ff *shard[] = { &f };
+	const char *name[] = { "memory" };
+	struct ff_stats stats;
+	struct transport t;
+	struct solution s;
+	struct radiosity_report r;
+	struct radiosity_options ro = { 1e-4, UINT64_MAX, 2 };
+	struct err e = { 0 };
+
+	(void)state;
+	grid_new(&m, 6, 2, 1, 1);
+	grid_box(&m, 2, material, zero, one);
+	set_diffuse(&m, 0, 1, 1);
+	grid_end(&m);
+	memory_ff(&m, &rays, &f, &stats);
+	assert_int_equal(transport_init(&t, &m, shard, name, 1, 2, &e), 0);
+	assert_int_equal(solution_begin(&s, &m, &t, &e), 0);
+	assert_int_equal(radiosity_shoot(&s, &t, &ro, NULL, &r, &e), -1);
+	assert_non_null(strstr(e.text, "no steady state"));
+	transport_free(&t);
+	solution_free(&s);
+	ff_free(&f);
+	model_free(&m);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(furnace_by_rays),
+		cmocka_unit_test(furnace_by_hemicubes),
+		cmocka_unit_test(plates_by_rays),
+		cmocka_unit_test(plates_by_hemicubes),
+		cmocka_unit_test(white_box_has_no_steady_state),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
