@@ -552,6 +552,28 @@ static void test_digest(void **state)
 	assert_string_not_equal(a, d);
 }
 
+/* The manual's reader and the manual's tables, against all three files. */
+static void test_python(void **state)
+{
+	char command[512];
+	const char *files[] = { mesh_path, ff_path, rad_path };
+
+	(void)state;
+	if (access("tests/check_formats.py", R_OK))
+		skip(); /* not run from the top of the source */
+	write_mesh();
+	write_ff();
+	write_rad();
+	snprintf(command, sizeof command, "/usr/bin/python3 tests/check_formats.py man %s %s %s",
+	         files[0], files[1], files[2]);
+	assert_int_equal(system(command), 0);
+	for (int i = 0; i < 3; i++) {
+		snprintf(command, sizeof command, "/usr/bin/python3 tests/read_cache.py %s | "
+		         "grep -q '^%s [FU]'", files[i], i == 1 ? "value" : "vertex");
+		assert_int_equal(system(command), 0);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -567,6 +589,7 @@ int main(void)
 		cmocka_unit_test(test_wrong_kind),
 		cmocka_unit_test(test_foreign_ids),
 		cmocka_unit_test(test_digest),
+		cmocka_unit_test(test_python),
 	};
 
 	return cmocka_run_group_tests(tests, set_up, tear_down);
