@@ -27,7 +27,7 @@ void pathtrace_free(struct pathtrace *p);
 int pathtrace_diverges(const struct model *m);
 
 struct pathtrace_options {
-	long samples;      /* paths a pixel, or particles in all; at least 2 */
+	long samples;      /* paths a pixel (at least 1), or particles in all (2) */
 	uint64_t seed;
 	int threads;
 };
@@ -36,7 +36,8 @@ struct pathtrace_options {
  * bands 0, 1, 2, or the last there is), `band.0` and so on unless there are 1 or 3
  * bands, and for each of these a channel `stderr.R` and so on with the standard
  * error of the pixel, from batches of its samples. *relative_error (may be NULL):
- * the root mean square of the standard errors of R, G and B over their mean.
+ * the root mean square of the standard errors of R, G and B over their mean. One
+ * sample has no standard error: no such channels, and infinity.
  * Next-event estimation of the area emitters with multiple importance sampling,
  * also straight through clear panes; ideal events are followed; Russian roulette
  * after a few bounces. O(pixels samples bounces log triangles). */

@@ -237,7 +237,8 @@ static void render_pixel(const struct render *j, size_t pixel)
 		error[b] = sqrt(squares * (double)batches / (double)(batches - 1));
 	}
 	put(j, pixel, 0, mean);
-	put(j, pixel, 3 + band_channels(j->p->m), error);
+	if (batches > 1)
+		put(j, pixel, 3 + band_channels(j->p->m), error);
 }
 
 static void render_pixels(void *arg, size_t begin, size_t end, int thread)
@@ -255,9 +256,9 @@ static int new_picture(const struct render *j, struct err *e)
 	static const char *const colour[] = { "R", "G", "B" };
 	char text[MOST][LENGTH];
 	const char *name[MOST];
-	int n = 3 + band_channels(j->p->m);
+	int n = 3 + band_channels(j->p->m), channels = j->o->samples > 1 ? 2 * n : n;
 
-	for (int c = 0; c < 2 * n; c++) {
+	for (int c = 0; c < channels; c++) {
 		const char *prefix = c < n ? "" : "stderr.";
 		if (c % n < 3)
 			snprintf(text[c], LENGTH, "%s%s", prefix, colour[c % n]);
@@ -265,7 +266,7 @@ static int new_picture(const struct render *j, struct err *e)
 			snprintf(text[c], LENGTH, "%sband.%d", prefix, c % n - 3);
 		name[c] = text[c];
 	}
-	return image_new(j->picture, j->f->width, j->f->height, 2 * n, name, e);
+	return image_new(j->picture, j->f->width, j->f->height, channels, name, e);
 }
 
 static double relative_rms(const struct image *picture, int first_error)
@@ -289,12 +290,11 @@ int pathtrace_picture(const struct pathtrace *p, const struct view_frame *f,
 {
 	struct render j = { p, f, o, picture };
 
-	if (o->samples < 2)
-		return err_set(e, "a standard error needs at least 2 samples a pixel");
 	if (new_picture(&j, e))
 		return -1;
 	par_for((size_t)f->width * (size_t)f->height, 16, o->threads, render_pixels, &j, progress);
 	if (relative_error)
-		*relative_error = relative_rms(picture, 3 + band_channels(p->m));
+		*relative_error = o->samples < 2 ? (double)INFINITY
+		                                 : relative_rms(picture, 3 + band_channels(p->m));
 	return 0;
 }

@@ -1,0 +1,407 @@
+/* reference: the yardstick; unbiased pictures and irradiance by Monte Carlo. */
+#include <errno.h>
+#include <fcntl.h>
+#include <getopt.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "../formats/atomic_file.h"
+#include "../formats/cache.h"
+#include "../formats/digest.h"
+#include "../formats/exr_file.h"
+#include "../formats/history.h"
+#include "../formats/mesh_file.h"
+#include "../lib/camera.h"
+#include "../lib/mem.h"
+#include "../lib/pathtrace.h"
+#include "common/cli.h"
+
+enum { OPT_SAMPLES = 256, OPT_SEED, OPT_IRRADIANCE, OPT_COMPRESSION };
+enum { PICTURE_SAMPLES = 64, PARTICLES = 1000000 };
+
+static const struct cli_option option_table[] = {
+	{ 'c', "camera", "NAME", "camera to render" },
+	{ 'o', "output", "FILE", "picture (EXR) or table (CSV) to write; - for standard output" },
+	{ 's', "size", "WxH", "pixels (default: 640 wide, height from the camera's aspect)" },
+	{ OPT_IRRADIANCE, "irradiance", NULL, "irradiance of all element-sides by particles" },
+	{ OPT_SAMPLES, "samples", "N", "paths in each pixel (default: 64), or particles (1000000)" },
+	{ OPT_SEED, "seed", "N", "start of the random numbers (default: 1)" },
+	{ OPT_COMPRESSION, "compression", "METHOD", "zip (default), zips, piz, rle or none" },
+	{ 0, NULL, NULL, NULL }
+};
+
+struct reference {
+	struct cli cli;
+	/* options */
+	const char *mesh, *output, *camera;
+	int width, height, irradiance;
+	struct pathtrace_options o;
+	struct exr_file_options exr;
+	/* the work */
+	struct model m;
+	struct cache_info info;
+	struct view_frame frame;
+	const struct camera *view;
+	char key[33];
+	struct ray_scene *rays;
+	struct pathtrace *tracer;
+	FILE *results;              /* stderr when the output goes to stdout */
+};
+
+/* ---- options ---- */
+
+static void compression(struct reference *r, const char *text)
+{
+	int method = exr_file_compression_by_name(text);
+
+	if (method < 0)
+		cli_usage(&r->cli, "--compression: '%s' is none of zip, zips, piz, rle, none", text);
+	r->exr.compression = (enum exr_file_compression)method;
+}
+
+static void take_option(struct reference *r, int letter)
+{
+	const struct cli *c = &r->cli;
+
+	switch (letter) {
+	case 'c': r->camera = optarg; break;
+	case 'o': r->output = optarg; break;
+	case 's':
+		if (camera_parse_size(optarg, &r->width, &r->height))
+			cli_usage(c, "--size: '%s' is not a size such as 640x480", optarg);
+		break;
+	case OPT_IRRADIANCE: r->irradiance = 1; break;
+	case OPT_SAMPLES:
+		r->o.samples = cli_integer(c, "--samples", optarg, 1, 1000000000000);
+		break;
+	case OPT_SEED: r->o.seed = (uint64_t)cli_integer(c, "--seed", optarg, 0, INT64_MAX); break;
+	case OPT_COMPRESSION: compression(r, optarg); break;
+	}
+}
+
+static void parse(struct reference *r, int argc, char **argv)
+{
+	const struct cli *c = &r->cli;
+	int letter;
+
+	while ((letter = cli_next(&r->cli, argc, argv)) != -1)
+		take_option(r, letter);
+	if (argc - optind != 1)
+		cli_usage(c, argc == optind ? "a .mesh file is needed" : "one .mesh file at a time");
+	r->mesh = argv[optind];
+	if (r->irradiance && (r->camera || r->width))
+		cli_usage(c, "--irradiance has no camera and no size");
+	if (!r->output && !r->irradiance)
+		cli_usage(c, "-o is needed: the picture to write");
+	if (!r->output)
+		r->output = "-";
+	if (!r->o.samples)
+		r->o.samples = r->irradiance ? PARTICLES : PICTURE_SAMPLES;
+	if (r->irradiance && r->o.samples < 2)
+		cli_usage(c, "--samples: a standard error needs at least 2 particles");
+	r->o.threads = r->cli.threads;
+	r->results = strcmp(r->output, "-") == 0 ? stderr : stdout;
+}
+
+/* ---- what is to be made ---- */
+
+/* Everything that decides a picture's contents. */
+static void picture_key(struct reference *r, const char *content)
+{
+	const int64_t number[] = { r->frame.width, r->frame.height, r->o.samples,
+		(int64_t)r->o.seed, (int64_t)r->exr.compression };
+	struct digest *d = digest_new();
+	char camera[33];
+
+	cache_camera_id(r->view, camera);
+	digest_string(d, "twopass.reference " TWOPASS_VERSION);
+	digest_string(d, content);
+	digest_string(d, camera);
+	digest_bytes(d, number, sizeof number);
+	digest_end(d, r->key);
+}
+
+static int choose_view(struct reference *r, const char *content, struct err *e)
+{
+	struct err why = { 0 };
+	int i = !r->camera && r->m.cameras == 1
+	      ? 0 /* a scene's only camera need not be named */
+	      : camera_find(&r->m, r->camera ? r->camera : "", &why);
+
+	if (i < 0)
+		return err_set(e, "%s: %s%s", r->mesh, r->camera ? "" : "a camera is needed (-c); ",
+		               why.text);
+	r->view = &r->m.camera[i];
+	if (camera_frame(r->view, r->width, r->height, &r->frame, e))
+		return -1;
+	picture_key(r, content);
+	return 0;
+}
+
+static int read_scene(struct reference *r, struct err *e)
+{
+	struct container *c = container_open(r->mesh, "twopass.mesh", e);
+	char content[33];
+
+	if (!c)
+		return -1;
+	container_digest(c, content);
+	container_close(c);
+	if (mesh_file_read(r->mesh, &r->m, &r->info, e))
+		return -1;
+	return r->irradiance ? 0 : choose_view(r, content, e);
+}
+
+/* 1 if the picture is there with the same key; it is then touched. */
+static int up_to_date(const struct reference *r)
+{
+	struct exr_file_info info = { 0 };
+	struct err ignored = { 0 };
+	struct stat st;
+
+	if (r->irradiance || stat(r->output, &st) || !S_ISREG(st.st_mode) ||
+	    exr_file_read_info(r->output, &info, &ignored))
+		return 0;
+	const char *key = exr_file_info_get(&info, EXR_FILE_KEY);
+	int same = key && strcmp(key, r->key) == 0;
+	exr_file_info_free(&info);
+	return same && utimensat(AT_FDCWD, r->output, NULL, 0) == 0;
+}
+
+/* Better now than after the work. */
+static int check_directory(const char *path, struct err *e)
+{
+	const char *slash = strrchr(path, '/');
+	char *directory;
+	int bad = 0;
+
+	if (!slash)
+		return 0;
+	if (!(directory = mem_new((size_t)(slash - path) + 2, 1, "path", e)))
+		return -1;
+	memcpy(directory, path, (size_t)(slash - path) + 1);
+	if (access(directory, W_OK | X_OK))
+		bad = err_set(e, "%s: %s; create its directory or choose another", path,
+		              strerror(errno));
+	free(directory);
+	return bad;
+}
+
+static int prepare(struct reference *r, struct err *e)
+{
+	struct err why = { 0 };
+
+	r->rays = ray_scene_new(&r->m, e);
+	if (!r->rays)
+		return -1;
+	r->tracer = pathtrace_new(&r->m, r->rays, &why);
+	return r->tracer ? 0 : err_set(e, "%s: %s", r->mesh, why.text);
+}
+
+/* ---- pictures ---- */
+
+static int describe(const struct reference *r, double relative, const char *history,
+                    struct exr_file_info *info, struct err *e)
+{
+	char statistics[160], error[48] = "null";
+
+	if (isfinite(relative))
+		snprintf(error, sizeof error, "%.9g", relative);
+	snprintf(statistics, sizeof statistics,
+	         "{\"samples\": %ld, \"seed\": %" PRIu64 ", \"relative_standard_error\": %s}",
+	         r->o.samples, r->o.seed, error);
+	info->white_luminance = 1;
+	info->has_world_to_camera = 1;
+	camera_world_to_camera(&r->frame, info->world_to_camera);
+	return exr_file_info_set(info, EXR_FILE_CAMERA, r->view->name, e) ||
+	       exr_file_info_set(info, EXR_FILE_HISTORY, history, e) ||
+	       exr_file_info_set(info, EXR_FILE_KEY, r->key, e) ||
+	       exr_file_info_set(info, "statistics", statistics, e) ? -1 : 0;
+}
+
+static int write_picture(const struct reference *r, double relative, const struct image *im,
+                         int argc, char **argv, struct err *e)
+{
+	struct exr_file_info info = { 0 };
+	char *history = history_append(r->info.history, argc, argv, e);
+	int bad = !history || describe(r, relative, history, &info, e) ||
+	          exr_file_write(r->output, im, &info, &r->exr, NULL, e);
+
+	exr_file_info_free(&info);
+	free(history);
+	return bad ? -1 : 0;
+}
+
+static void report_picture(const struct reference *r, double relative, double seconds)
+{
+	if (r->cli.quiet)
+		return;
+	fprintf(r->results, "%s: %s, %d x %d, %ld sample%s a pixel in %.3f s", r->output,
+	        r->view->name, r->frame.width, r->frame.height, r->o.samples,
+	        r->o.samples == 1 ? "" : "s", seconds);
+	if (isfinite(relative))
+		fprintf(r->results, "; standard error %.3g of the mean\n", relative);
+	else
+		fprintf(r->results, "; standard error unknown\n");
+}
+
+static int make_picture(const struct reference *r, int argc, char **argv, struct err *e)
+{
+	struct image im = { 0 };
+	struct cli_progress bar;
+	double relative, begun = cli_seconds();
+	struct progress progress = cli_progress_begin(&bar, &r->cli, r->view->name);
+	int bad = pathtrace_picture(r->tracer, &r->frame, &r->o, &progress, &im, &relative, e);
+
+	cli_progress_end(&bar);
+	double seconds = cli_seconds() - begun;
+	bad = bad || write_picture(r, relative, &im, argc, argv, e);
+	image_free(&im);
+	if (bad)
+		return -1;
+	report_picture(r, relative, seconds);
+	if (pathtrace_diverges(&r->m))
+		cli_warn(&r->cli, "%s: the variance of eye paths over the paper's lobe diverges: do "
+		         "not rely on the picture's standard error; compare --irradiance, or use "
+		         "'mesh --lobe reciprocal'", r->mesh);
+	return 0;
+}
+
+/* ---- irradiance ---- */
+
+/* RFC 4180 */
+static void put_name(FILE *f, const char *name)
+{
+	if (!name[strcspn(name, ",\"\r\n")]) {
+		fputs(name, f);
+		return;
+	}
+	putc('"', f);
+	for (; *name; name++) {
+		if (*name == '"')
+			putc('"', f);
+		putc(*name, f);
+	}
+	putc('"', f);
+}
+
+static void put_table(FILE *f, const struct model *m, const struct pathtrace_irradiance *h)
+{
+	size_t bands = (size_t)m->bands;
+
+	fputs("element,side,patch,name,area", f);
+	for (size_t b = 0; b < bands; b++)
+		fprintf(f, ",H_%zu", b);
+	for (size_t b = 0; b < bands; b++)
+		fprintf(f, ",SE_%zu", b);
+	putc('\n', f);
+	for (size_t row = 0; row < 2 * m->elements; row++) {
+		uint32_t patch = m->element_patch[row / 2];
+		if (!model_side_modelled(m, 2 * patch + (uint32_t)(row % 2)))
+			continue;
+		fprintf(f, "%zu,%s,%" PRIu32 ",", row / 2, row % 2 ? "back" : "front", patch);
+		put_name(f, m->surface.name[m->patch_surface[patch]]);
+		fprintf(f, ",%.17g", m->element_area[row / 2]);
+		for (size_t b = 0; b < bands; b++)
+			fprintf(f, ",%.17g", h->h[row * bands + b]);
+		for (size_t b = 0; b < bands; b++)
+			fprintf(f, ",%.17g", h->error[row * bands + b]);
+		putc('\n', f);
+	}
+}
+
+static int write_table(const struct reference *r, const struct pathtrace_irradiance *h,
+                       struct err *e)
+{
+	char *text = NULL;
+	size_t length = 0;
+	FILE *f = open_memstream(&text, &length);
+	int bad;
+
+	if (!f)
+		return err_set(e, "%s: out of memory", r->output);
+	put_table(f, &r->m, h);
+	bad = ferror(f);
+	bad |= fclose(f);
+	bad = bad ? err_set(e, "%s: out of memory", r->output)
+	          : atomic_file_put(r->output, text, length, e);
+	free(text);
+	return bad;
+}
+
+static void report_irradiance(const struct reference *r, const struct pathtrace_irradiance *h,
+                              double seconds)
+{
+	if (r->cli.quiet)
+		return;
+	fprintf(r->results, "%s: %ld particles in %.3f s\n", r->output, r->o.samples, seconds);
+	fprintf(r->results, "escaped, as a fraction of what is emitted:");
+	for (int b = 0; b < r->m.bands; b++)
+		if (h->emitted[b] > 0)
+			fprintf(r->results, " %.6g +- %.2g", h->escaped[b] / h->emitted[b],
+			        h->escaped_error[b] / h->emitted[b]);
+		else
+			fprintf(r->results, " -");
+	putc('\n', r->results);
+}
+
+static int make_irradiance(const struct reference *r, struct err *e)
+{
+	struct pathtrace_irradiance h = { 0 };
+	struct cli_progress bar;
+	double begun = cli_seconds();
+	struct progress progress = cli_progress_begin(&bar, &r->cli, "particles");
+	int bad = pathtrace_particles(r->tracer, &r->o, &progress, &h, e);
+
+	cli_progress_end(&bar);
+	double seconds = cli_seconds() - begun;
+	bad = bad || write_table(r, &h, e);
+	if (!bad)
+		report_irradiance(r, &h, seconds);
+	pathtrace_irradiance_free(&h);
+	return bad ? -1 : 0;
+}
+
+static int run(struct reference *r, int argc, char **argv, struct err *e)
+{
+	if (read_scene(r, e))
+		return -1;
+	if (up_to_date(r)) {
+		cli_note(&r->cli, "%s: up to date", r->output);
+		return 0;
+	}
+	if (check_directory(r->output, e) || prepare(r, e) ||
+	    (r->irradiance ? make_irradiance(r, e) : make_picture(r, argc, argv, e)))
+		return -1;
+	cli_detail(&r->cli, "peak memory %.0f MB", cli_peak_megabytes());
+	return 0;
+}
+
+int main(int argc, char **argv)
+{
+	struct reference r = {
+		.cli = { .program = "reference",
+		         .synopsis = "[options] FILE.mesh -c CAMERA -o PICTURE.exr\n"
+		                     "       reference [options] FILE.mesh --irradiance [-o TABLE.csv]",
+		         .about = "Solve a scene by unbiased Monte Carlo, to compare with.",
+		         .options = option_table, .uses_threads = 1 },
+		.o = { .seed = 1 }
+	};
+	struct err e = { 0 };
+	int status = 0;
+
+	cli_signals();
+	parse(&r, argc, argv);
+	if (run(&r, argc, argv, &e))
+		status = cli_fail(&r.cli, &e);
+	pathtrace_free(r.tracer);
+	ray_scene_free(r.rays);
+	cache_info_free(&r.info);
+	model_free(&r.m);
+	return cli_finish(&r.cli, status);
+}
