@@ -152,7 +152,10 @@ int hemicube_init(struct hemicube *h, const struct hemi_grid *g, struct err *e)
 	h->item = mem_new(g->pixels + HEMI_LANES, sizeof *h->item, "item buffer", e);
 	h->depth = mem_new(g->pixels + HEMI_LANES, sizeof *h->depth, "depth buffer", e);
 	h->work = mem_new(1, sizeof *h->work, "hemicube", e);
-	if (!h->item || !h->depth || !h->work) {
+	if (h->work)
+		h->work->far = mem_new(hemi_tiles(g->n) * (hemi_tiles(g->n) + 4 * hemi_tiles(g->n / 2)),
+		                       sizeof *h->work->far, "depth tiles", e);
+	if (!h->item || !h->depth || !h->work || !h->work->far) {
 		hemicube_free(h);
 		return -1;
 	}
@@ -163,6 +166,8 @@ void hemicube_free(struct hemicube *h)
 {
 	free(h->item);
 	free(h->depth);
+	if (h->work)
+		free(h->work->far);
 	free(h->work);
 	*h = (struct hemicube){ 0 };
 }

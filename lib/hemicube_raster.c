@@ -16,6 +16,7 @@
 typedef double v4d __attribute__((vector_size(32)));
 typedef int64_t v4l __attribute__((vector_size(32)));
 typedef int32_t v4i __attribute__((vector_size(16)));
+typedef float v4f __attribute__((vector_size(16)));
 typedef float v8f __attribute__((vector_size(32)));
 typedef int32_t v8i __attribute__((vector_size(32)));
 typedef uint32_t v8u __attribute__((vector_size(32)));
@@ -23,6 +24,8 @@ typedef uint32_t v8u __attribute__((vector_size(32)));
 /* The pyramid's half width in units of the face's. Wide enough that few
  * triangles need clipping. */
 static const double GUARD = 4;
+
+static const double THIN = 1e-7;
 
 /* Bits of a vertex's code. */
 enum { OUT_RIGHT = 1, OUT_LEFT = 2, OUT_UP = 4, OUT_DOWN = 8, OUT_PYRAMID = 15,
@@ -40,8 +43,10 @@ struct target {
 	uint32_t *item;
 	float *depth;
 	int columns, rows;
-	double half;          /* pixels per unit of u/w */
+	double half, pixel;   /* pixels per unit of u/w, and its inverse */
 	double centre_row;    /* row coordinate of v = 0 */
+	float *far;           /* tiles */
+	int tiles;            /* in a row of them */
 };
 
 /* A vertex on a face: pixel coordinates, 1/w, and the first column and row whose
@@ -51,10 +56,9 @@ struct corner {
 	int32_t column, row;
 };
 
-/* 1/w = q0 + qx x + qy y over a triangle, within [low, high]. */
+/* 1/w = q0 + qx x + qy y over a triangle, (x, y) in pixels. */
 struct depth_plane {
 	double q0, qx, qy;
-	float low, high;
 };
 
 static inline double min_d(double a, double b)
@@ -77,34 +81,30 @@ static inline int max_i(int a, int b)
 	return a > b ? a : b;
 }
 
-/* Draws columns [left, right) of a row. */
+/* Draws columns [left, right) of a row. A pixel's depth is a function of the plane
+ * and the pixel alone, so coincident surfaces get the same. */
 static inline void draw_span(const struct target *t, int row, int left, int right,
                              const struct depth_plane *p, uint32_t item)
 {
 	static const v8i lane = { 0, 1, 2, 3, 4, 5, 6, 7 };
-	uint32_t *items = t->item + (size_t)row * (size_t)t->columns;
-	float *depths = t->depth + (size_t)row * (size_t)t->columns;
-	double q = p->q0 + p->qy * (row + .5) + p->qx * .5;
-	v8f step = __builtin_convertvector(lane, v8f) * (float)p->qx;
+	static const v4d low = { .5, 1.5, 2.5, 3.5 }, high = { 4.5, 5.5, 6.5, 7.5 };
+	size_t first = (size_t)row * (size_t)t->columns;
+	double q = p->q0 + p->qy * (row + .5);
 	v8u id = item - (v8u){ 0 };
 
-	/* Groups begin at multiples of the width, so that the depths of coincident
-	 * surfaces are rounded alike. */
-	for (int i = left & ~(HEMI_LANES - 1); i < right; i += HEMI_LANES) {
-		v8f z, near = step + (float)(q + p->qx * i);
+	for (int i = left; i < right; i += HEMI_LANES) {
+		v4f a = __builtin_convertvector(q + p->qx * (low + i), v4f);
+		v4f b = __builtin_convertvector(q + p->qx * (high + i), v4f);
+		v8f z, near = __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
 		v8u seen;
-		memcpy(&z, depths + i, sizeof z);
-		memcpy(&seen, items + i, sizeof seen);
-		v8i less = near < p->low, more = near > p->high;
-		near = (v8f)(((v8i)near & ~(less | more)) |
-		             (less & (v8i)(p->low - (v8f){ 0 })) |
-		             (more & (v8i)(p->high - (v8f){ 0 })));
-		v8i inside = (lane >= left - i) & (lane < right - i);
-		v8i wins = inside & ((near > z) | ((near == z) & (v8i)(id < seen)));
+		memcpy(&z, t->depth + first + i, sizeof z);
+		memcpy(&seen, t->item + first + i, sizeof seen);
+		v8i wins = (lane < right - i) &
+		           ((near > z) | ((near == z) & (v8i)(id < seen)));
 		z = (v8f)(((v8i)near & wins) | ((v8i)z & ~wins));
 		seen = (id & (v8u)wins) | (seen & ~(v8u)wins);
-		memcpy(depths + i, &z, sizeof z);
-		memcpy(items + i, &seen, sizeof seen);
+		memcpy(t->depth + first + i, &z, sizeof z);
+		memcpy(t->item + first + i, &seen, sizeof seen);
 	}
 }
 
@@ -168,8 +168,9 @@ static void draw_triangle(const struct target *t, const struct corner *a,
 	}
 }
 
-/* The depth plane of the triangle abc (face coordinates), and the side of it
- * that faces the eye. With normal N and D = N.a, 1/w = N.(u/w, v/w, 1) / D. */
+/* The depth plane of the triangle abc (face coordinates), whose 1/w lies in
+ * [low, high], and the side of it that faces the eye. With normal N and D = N.a,
+ * 1/w = N.(u/w, v/w, 1) / D. */
 static inline int depth_plane(const struct target *t, const double a[3], const double b[3],
                               const double c[3], double low, double high,
                               struct depth_plane *p)
@@ -180,15 +181,13 @@ static inline int depth_plane(const struct target *t, const double a[3], const d
 		d[k] = b[k] - a[k], e[k] = c[k] - a[k];
 	double n[3] = { d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2],
 		        d[0] * e[1] - d[1] * e[0] };
-	double D = n[0] * a[0] + n[1] * a[1] + n[2] * a[2];
-	double scale = 1 / (D * t->half);
-	p->low = (float)low;
-	p->high = (float)high;
-	p->qx = n[0] * scale;
-	p->qy = n[1] * scale;
-	p->q0 = (n[2] - n[0]) / D - p->qy * t->centre_row;
-	/* Seen exactly edge on: the plane is undefined, but gaps must not open. */
-	if (!(fabs(p->q0) <= 1e30 && fabs(p->qx) <= 1e30 && fabs(p->qy) <= 1e30))
+	double D = n[0] * a[0] + n[1] * a[1] + n[2] * a[2], inverse = 1 / D;
+	p->qx = n[0] * inverse * t->pixel;
+	p->qy = n[1] * inverse * t->pixel;
+	p->q0 = (n[2] - n[0]) * inverse - p->qy * t->centre_row;
+	/* Seen edge on, thinner than THIN pixels: the plane is ill defined, but gaps
+	 * must not open. */
+	if (!((fabs(p->qx) + fabs(p->qy)) * THIN < high - low))
 		p->q0 = high, p->qx = p->qy = 0;
 	return D < 0 ? FRONT : BACK;
 }
@@ -400,46 +399,143 @@ static int sphere_inside(const struct face *f, const double c[3], double radius,
 	return w - fabs(c[f->u]) >= limit && w - fabs(c[f->v]) >= limit;
 }
 
+/* Notes the least depth of each tile of a face. */
+static void note_far(const struct target *t)
+{
+	float *out = t->far;
+
+	for (int j = 0; j < t->rows; j += HEMI_LANES)
+		for (int i = 0; i < t->columns; i += HEMI_LANES, out++) {
+			v8f least = (v8f){ 0 } + INFINITY;
+			/* Beyond the end of a row are other pixels: that is only cautious. */
+			for (int row = j; row < min_i(j + HEMI_LANES, t->rows); row++) {
+				v8f z;
+				memcpy(&z, t->depth + (size_t)row * (size_t)t->columns + i, sizeof z);
+				v8i less = z < least;
+				least = (v8f)(((v8i)z & less) | ((v8i)least & ~less));
+			}
+			*out = least[0];
+			for (int k = 1; k < HEMI_LANES; k++)
+				*out = least[k] < *out ? least[k] : *out;
+		}
+}
+
+/* First and last tile that the interval [x - r, x + r] / [w - r, w + r] may reach. */
+static inline void tile_range(double x, double w, double r, double half, double centre,
+                              int tiles, int range[2])
+{
+	double low = (x - r) / (x > r ? w + r : w - r);
+	double high = (x + r) / (x > -r ? w - r : w + r);
+
+	low = max_d((low * half + centre) / HEMI_LANES - 1e-6, 0);
+	high = min_d((high * half + centre) / HEMI_LANES + 1e-6, tiles - 1);
+	range[0] = (int)low;
+	range[1] = (int)high;
+}
+
+/* 1 if a sphere (centre in the cube's frame) was wholly behind what had been drawn
+ * on the face when its tiles were noted. */
+static int hidden(const struct target *t, const struct face *f, const double c[3], double r)
+{
+	double w = f->sw * c[f->w];
+	int column[2], row[2];
+
+	if (!(w > 1.001 * r))
+		return 0;
+	double nearest = 1.000001 / (w - r);
+	tile_range(f->su * c[f->u], w, r, t->half, t->half, t->tiles, column);
+	tile_range(c[f->v], w, r, t->half, t->centre_row, (t->rows + HEMI_LANES - 1) / HEMI_LANES,
+	           row);
+	for (int j = row[0]; j <= row[1]; j++)
+		for (int i = column[0]; i <= column[1]; i++)
+			if (!(t->far[j * t->tiles + i] > nearest))
+				return 0;
+	return 1;
+}
+
 static struct target target_face(const struct hemicube *h, int face)
 {
-	size_t n = (size_t)h->grid->n;
-	size_t first = face ? n * n + (size_t)(face - 1) * (n * n / 2) : 0;
+	size_t n = (size_t)h->grid->n, tiles = hemi_tiles(h->grid->n);
+	size_t before = face ? (size_t)(face - 1) : 0;
+	size_t first = face ? n * n + before * (n * n / 2) : 0;
+	size_t tile = face ? tiles * (tiles + before * hemi_tiles(h->grid->n / 2)) : 0;
 	int half = h->grid->n / 2;
 
 	return (struct target){ .item = h->item + first, .depth = h->depth + first,
 	                        .columns = h->grid->n, .rows = face ? half : 2 * half,
-	                        .half = half, .centre_row = face ? 0 : half };
+	                        .half = half, .pixel = 1. / half,
+	                        .centre_row = face ? 0 : half,
+	                        .far = h->work->far + tile, .tiles = (int)tiles };
+}
+
+/* What one call of hemicube_render draws. */
+struct drawing {
+	const struct hemi_scene *s;
+	const double *eye;
+	const double (*frame)[3];
+	uint32_t own;
+	struct target target[5];
+};
+
+static void render_cluster(const struct drawing *g, struct hemi_work *w,
+                           const struct hemi_cluster *c)
+{
+	double d[3], at[3];
+	int transformed = 0;
+
+	v3_sub(c->centre, g->eye, d);
+	for (int k = 0; k < 3; k++)
+		at[k] = v3_dot(g->frame[k], d);
+	if (at[2] + c->radius <= g->s->horizon)
+		return;
+	for (int k = 0; k < 5; k++) {
+		const struct face *f = &faces[k];
+		if (!sphere_inside(f, at, c->radius, 1, -1) ||
+		    hidden(&g->target[k], f, at, c->radius))
+			continue;
+		if (!transformed)
+			transform(g->s, c, g->eye, g->frame, w);
+		transformed = 1;
+		int coded = at[2] - c->radius <= g->s->horizon ||
+		            !sphere_inside(f, at, c->radius, GUARD, 1);
+		project(&g->target[k], f, w, c->vertices, coded, g->s->horizon);
+		draw_cluster(&g->target[k], f, g->s, c, w, coded, g->own);
+		w->drawn += (size_t)c->triangles;
+	}
 }
 
 void hemicube_render(struct hemicube *h, const struct hemi_scene *s, const double eye[3],
                      const double frame[3][3], uint32_t own)
 {
-	struct target target[5];
+	struct drawing g = { .s = s, .eye = eye, .frame = frame, .own = own };
+	size_t tiles = hemi_tiles(h->grid->n) * (hemi_tiles(h->grid->n) +
+	                                         4 * hemi_tiles(h->grid->n / 2));
+	int32_t stack[64];
+	int depth = 0;
 
 	memset(h->item, 0xff, h->grid->pixels * sizeof *h->item);
 	memset(h->depth, 0, h->grid->pixels * sizeof *h->depth);
+	memset(h->work->far, 0, tiles * sizeof *h->work->far);
+	h->work->drawn = 0;
 	for (int k = 0; k < 5; k++)
-		target[k] = target_face(h, k);
-	for (size_t n = 0; n < s->clusters; n++) {
-		const struct hemi_cluster *c = &s->cluster[n];
-		double d[3], at[3];
-		int transformed = 0;
-		v3_sub(c->centre, eye, d);
-		for (int k = 0; k < 3; k++)
-			at[k] = v3_dot(frame[k], d);
-		if (at[2] + c->radius <= s->horizon)
+		g.target[k] = target_face(h, k);
+	if (s->clusters)
+		stack[depth++] = s->root;
+	while (depth > 0) {
+		int32_t at = stack[--depth];
+		if (at >= 0) { /* the child on the eye's side first */
+			const struct hemi_split *p = &s->split[at];
+			int near = eye[p->axis] >= p->at;
+			stack[depth++] = p->child[!near];
+			stack[depth++] = p->child[near];
 			continue;
-		for (int k = 0; k < 5; k++) {
-			const struct face *f = &faces[k];
-			if (!sphere_inside(f, at, c->radius, 1, -1))
-				continue;
-			if (!transformed)
-				transform(s, c, eye, frame, h->work);
-			transformed = 1;
-			int coded = at[2] - c->radius <= s->horizon ||
-			            !sphere_inside(f, at, c->radius, GUARD, 1);
-			project(&target[k], f, h->work, c->vertices, coded, s->horizon);
-			draw_cluster(&target[k], f, s, c, h->work, coded, own);
+		}
+		render_cluster(&g, h->work, &s->cluster[~at]);
+		/* Noting the tiles costs about as much as drawing this many triangles. */
+		if (h->work->drawn * 32 > h->grid->pixels) {
+			for (int k = 0; k < 5; k++)
+				note_far(&g.target[k]);
+			h->work->drawn = 0;
 		}
 	}
 }

@@ -117,7 +117,7 @@ static void bounding_sphere(const struct hemi_scene *s, struct hemi_cluster *c)
 	c->radius = sqrt(far) * (1 + 4 * DBL_EPSILON) + s->horizon;
 }
 
-static void emit_cluster(struct builder *b, size_t begin, size_t end)
+static int32_t emit_cluster(struct builder *b, size_t begin, size_t end)
 {
 	struct hemi_scene *s = b->s;
 	struct hemi_cluster *c = &s->cluster[s->clusters];
@@ -136,26 +136,30 @@ static void emit_cluster(struct builder *b, size_t begin, size_t end)
 		s->y[b->vertices] = s->y[b->vertices - 1];
 		s->z[b->vertices] = s->z[b->vertices - 1];
 	}
-	s->clusters++;
+	return ~(int32_t)s->clusters++;
 }
 
 /* Halves [begin, end) at the median of the longest axis until it fits. */
-static void divide(struct builder *b, size_t begin, size_t end)
+static int32_t divide(struct builder *b, size_t begin, size_t end)
 {
-	while (end - begin > CLUSTER_TRIANGLES) {
-		double lo[3], hi[3];
-		int axis = 0;
-		bounds(b, begin, end, lo, hi);
-		for (int k = 1; k < 3; k++)
-			if (hi[k] - lo[k] > hi[axis] - lo[axis])
-				axis = k;
-		size_t middle = begin + (end - begin) / 2;
-		select_nth(b, axis, begin, end, middle);
-		divide(b, begin, middle);
-		begin = middle;
-	}
-	if (end > begin)
-		emit_cluster(b, begin, end);
+	double lo[3], hi[3];
+	int axis = 0;
+
+	if (end - begin <= CLUSTER_TRIANGLES)
+		return emit_cluster(b, begin, end);
+	bounds(b, begin, end, lo, hi);
+	for (int k = 1; k < 3; k++)
+		if (hi[k] - lo[k] > hi[axis] - lo[axis])
+			axis = k;
+	size_t middle = begin + (end - begin) / 2;
+	select_nth(b, axis, begin, end, middle);
+	int32_t n = (int32_t)b->s->splits++;
+	struct hemi_split *p = &b->s->split[n];
+	p->axis = axis;
+	p->at = b->centroid[3 * (size_t)b->order[middle] + (size_t)axis];
+	p->child[0] = divide(b, begin, middle);
+	p->child[1] = divide(b, middle, end);
+	return n;
 }
 
 static void prepare(struct builder *b)
@@ -187,6 +191,7 @@ static int allocate(struct builder *b, struct err *e)
 		return err_set(e, "too many elements for a hemicube: %zu", m->elements);
 	size_t vertices = 3 * (m->elements + clusters);
 	s->cluster = mem_new(clusters, sizeof *s->cluster, "hemicube clusters", e);
+	s->split = mem_new(clusters, sizeof *s->split, "hemicube clusters", e);
 	s->x = mem_new(vertices, sizeof *s->x, "hemicube vertices", e);
 	s->y = mem_new(vertices, sizeof *s->y, "hemicube vertices", e);
 	s->z = mem_new(vertices, sizeof *s->z, "hemicube vertices", e);
@@ -196,7 +201,7 @@ static int allocate(struct builder *b, struct err *e)
 	b->order = mem_new(m->elements, sizeof *b->order, "element order", e);
 	b->local = mem_new(m->vertices, sizeof *b->local, "vertex numbers", e);
 	b->stamp = mem_new(m->vertices, sizeof *b->stamp, "vertex stamps", e);
-	return s->cluster && s->x && s->y && s->z && s->corner && s->element &&
+	return s->cluster && s->split && s->x && s->y && s->z && s->corner && s->element &&
 	       b->centroid && b->order && b->local && b->stamp ? 0 : -1;
 }
 
@@ -220,7 +225,8 @@ struct hemi_scene *hemi_scene_new(const struct model *m, struct err *e)
 		b.s = NULL;
 	} else {
 		prepare(&b);
-		divide(&b, 0, m->elements);
+		if (m->elements)
+			b.s->root = divide(&b, 0, m->elements);
 		shrink(&b.s->x, b.vertices);
 		shrink(&b.s->y, b.vertices);
 		shrink(&b.s->z, b.vertices);
@@ -237,6 +243,7 @@ void hemi_scene_free(struct hemi_scene *s)
 	if (!s)
 		return;
 	free(s->cluster);
+	free(s->split);
 	free(s->x);
 	free(s->y);
 	free(s->z);

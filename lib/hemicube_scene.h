@@ -1,12 +1,13 @@
 /* Private to the hemicube: elements in clusters of neighbours, each with vertices
- * of its own, so that a cluster is transformed once and culled as a whole. */
+ * of its own, so that a cluster is transformed once and culled as a whole; a tree
+ * gives an order from near to far. */
 #ifndef TWOPASS_HEMICUBE_SCENE_H
 #define TWOPASS_HEMICUBE_SCENE_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-enum { CLUSTER_TRIANGLES = 64, CLUSTER_VERTICES = 3 * CLUSTER_TRIANGLES };
+enum { CLUSTER_TRIANGLES = 32, CLUSTER_VERTICES = 3 * CLUSTER_TRIANGLES };
 
 struct hemi_cluster {
 	double centre[3], radius;  /* bounding sphere */
@@ -16,24 +17,43 @@ struct hemi_cluster {
 	int triangles;
 };
 
+/* A plane between two sets of clusters, by their elements' centroids. */
+struct hemi_split {
+	double at;
+	int axis;
+	int32_t child[2];          /* below and above: a split, or ~cluster */
+};
+
 struct hemi_scene {
 	size_t clusters;
 	struct hemi_cluster *cluster;
+	size_t splits;
+	struct hemi_split *split;
+	int32_t root;              /* as child[]; none where clusters is 0 */
 	double *x, *y, *z;         /* vertices, world */
 	uint8_t (*corner)[4];      /* [elements] vertices within the cluster, and 0 */
 	uint32_t *element;         /* [elements] */
 	double horizon;            /* heights up to this are rounding of coordinates */
 };
 
-/* A thread's scratch: vertices of one cluster, in the cube's frame and projected
- * onto one face (in pixels). */
 enum { HEMI_LANES = 8 };
 
+/* A thread's scratch: vertices of one cluster, in the cube's frame and projected
+ * onto one face (in pixels). */
 struct hemi_work {
 	double v[3][CLUSTER_VERTICES];
 	double px[CLUSTER_VERTICES], py[CLUSTER_VERTICES], pq[CLUSTER_VERTICES];
 	int32_t column[CLUSTER_VERTICES], row[CLUSTER_VERTICES];
 	int32_t code[CLUSTER_VERTICES];
+	float *far;                /* least depth in each tile of HEMI_LANES^2 pixels,
+	                              some time ago */
+	size_t drawn;              /* triangles since */
 };
+
+/* Tiles of the top face, and then of each side. */
+static inline size_t hemi_tiles(int n)
+{
+	return (size_t)((n + HEMI_LANES - 1) / HEMI_LANES);
+}
 
 #endif
