@@ -21,13 +21,10 @@ static int parse_extent(const char *text, char **end, int *n)
 int camera_parse_size(const char *text, int *width, int *height)
 {
 	char *end;
-	int w, h = 0;
+	int w, h;
 
-	if (parse_extent(text, &end, &w))
-		return -1;
-	if (*end == 'x' && parse_extent(end + 1, &end, &h))
-		return -1;
-	if (*end)
+	if (parse_extent(text, &end, &w) || *end != 'x' || parse_extent(end + 1, &end, &h) ||
+	    *end)
 		return -1;
 	*width = w;
 	*height = h;

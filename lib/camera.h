@@ -22,8 +22,8 @@ struct view_frame {
 	double step_x, step_y;              /* the same units for one pixel */
 };
 
-/* Parses "WxH", or "W" (height 0: from the camera's aspect). 0, or -1 when text is
- * neither or out of [1, CAMERA_SIZE_MAX]. */
+/* Parses "WxH". 0, or -1 when text is anything else or a number is not in
+ * [1, CAMERA_SIZE_MAX]. */
 int camera_parse_size(const char *text, int *width, int *height);
 
 /* Index of the camera called `name` in m, or -1 and e, which lists those there are

@@ -1,4 +1,5 @@
 /* trace: the view-dependent pass; pictures of a solved scene. */
+#include <errno.h>
 #include <fcntl.h>
 #include <getopt.h>
 #include <inttypes.h>
@@ -60,8 +61,8 @@ struct trace {
 	const char **camera;        /* [cameras] names asked for */
 	int cameras, all;
 	int width, height;
-	const char *eye, *target, *up;
-	double fov;
+	int has_eye, has_target, has_up;
+	double eye[3], target[3], up[3], fov;
 	struct view_options view;
 	struct exr_file_options exr;
 	/* the work */
@@ -77,18 +78,21 @@ struct trace {
 	struct ray_scene *rays;
 	struct view_scene *scene;
 	char *history;
+	char ready[1024];           /* what reading and building took */
 	FILE *results;              /* stderr when the picture goes to stdout */
 };
 
 /* ---- options ---- */
 
-static void vector(const struct cli *c, const char *option, const char *text, double v[3])
+/* Always 1: an option that is there. */
+static int vector(const struct cli *c, const char *option, const char *text, double v[3])
 {
 	char extra;
 
 	if (sscanf(text, "%lf,%lf,%lf%c", &v[0], &v[1], &v[2], &extra) != 3 ||
 	    !isfinite(v[0] + v[1] + v[2]))
 		cli_usage(c, "%s: '%s' is not three numbers X,Y,Z", option, text);
+	return 1;
 }
 
 static void diffuse_method(const struct cli *c, const char *text)
@@ -128,9 +132,9 @@ static void take_option(struct trace *t, int letter)
 			cli_usage(c, "--size: '%s' is not a size such as 640x480", optarg);
 		break;
 	case 'd': diffuse_method(c, optarg); break;
-	case OPT_EYE: t->eye = optarg; break;
-	case OPT_TARGET: t->target = optarg; break;
-	case OPT_UP: t->up = optarg; break;
+	case OPT_EYE: t->has_eye = vector(c, "--eye", optarg, t->eye); break;
+	case OPT_TARGET: t->has_target = vector(c, "--target", optarg, t->target); break;
+	case OPT_UP: t->has_up = vector(c, "--up", optarg, t->up); break;
 	case OPT_FOV: t->fov = cli_number(c, "--fov", optarg, 1e-3, 179.9); break;
 	case OPT_SAMPLES:
 		t->view.samples = (int)cli_integer(c, "--samples", optarg, 1, 1 << 16);
@@ -164,9 +168,9 @@ static void parse(struct trace *t, int argc, char **argv)
 	t->rad = argv[optind];
 	if (!t->output)
 		cli_usage(c, "-o is needed: the picture to write");
-	if (!t->eye != !t->target)
+	if (t->has_eye != t->has_target)
 		cli_usage(c, "--eye and --target go together");
-	if (!t->eye && (t->up || t->fov > 0))
+	if (!t->has_eye && (t->has_up || t->fov > 0))
 		cli_usage(c, "--up and --fov belong to a view by --eye and --target");
 	t->view.threads = t->cli.threads;
 	t->results = strcmp(t->output, "-") == 0 ? stderr : stdout;
@@ -176,18 +180,17 @@ static void parse(struct trace *t, int argc, char **argv)
 
 static int ad_hoc_camera(struct trace *t, struct err *e)
 {
-	double eye[3], target[3], up[3] = { 0, 1, 0 }, other[3] = { 0, 0, -1 };
+	static const double y[3] = { 0, 1, 0 }, minus_z[3] = { 0, 0, -1 };
 	double fov = t->fov > 0 ? t->fov : 50;
 	struct err steep = { 0 };
 
-	vector(&t->cli, "--eye", t->eye, eye);
-	vector(&t->cli, "--target", t->target, target);
-	if (t->up)
-		vector(&t->cli, "--up", t->up, up);
-	/* Straight up or down, -Z takes the place of the default Y. */
-	if (camera_look_at(eye, target, up, fov, &t->ad_hoc, t->up ? e : &steep) &&
-	    (t->up || camera_look_at(eye, target, other, fov, &t->ad_hoc, e)))
-		return -1;
+	if (t->has_up) {
+		if (camera_look_at(t->eye, t->target, t->up, fov, &t->ad_hoc, e))
+			return -1;
+	} else if (camera_look_at(t->eye, t->target, y, fov, &t->ad_hoc, &steep) &&
+	           camera_look_at(t->eye, t->target, minus_z, fov, &t->ad_hoc, e)) {
+		return -1; /* -Z would do for looking straight up or down */
+	}
 	t->ad_hoc.name = mem_new(1, sizeof "view", "name", e);
 	return t->ad_hoc.name ? (void)strcpy(t->ad_hoc.name, "view"), 0 : -1;
 }
@@ -250,12 +253,12 @@ static int list_shots(struct trace *t, struct err *e)
 	const struct model *m = &t->cameras_of;
 
 	t->shot = mem_new(m->cameras + (size_t)t->cameras + 1, sizeof *t->shot, "views", e);
-	if (!t->shot || (t->eye && (ad_hoc_camera(t, e) || add_shot(t, &t->ad_hoc, e))))
+	if (!t->shot || (t->has_eye && (ad_hoc_camera(t, e) || add_shot(t, &t->ad_hoc, e))))
 		return -1;
 	if (t->all && m->cameras == 0)
 		return err_set(e, "%s: has no cameras; give a view by --eye and --target", t->rad);
 	/* A scene's only camera need not be named. */
-	if (!t->eye && !t->all && t->cameras == 0 && m->cameras == 1)
+	if (!t->has_eye && !t->all && t->cameras == 0 && m->cameras == 1)
 		t->all = 1;
 	for (size_t i = 0; i < m->cameras && t->all; i++)
 		if (add_shot(t, &m->camera[i], e))
@@ -317,8 +320,7 @@ static int check_directory(const char *path, struct err *e)
 		return -1;
 	memcpy(directory, path, (size_t)(slash - path));
 	if (access(directory, W_OK | X_OK))
-		bad = err_set(e, "%s: cannot write into directory %s; create it or choose another",
-		              path, directory);
+		bad = err_set(e, "%s: cannot write there: %s", path, strerror(errno));
 	free(directory);
 	return bad;
 }
@@ -341,11 +343,10 @@ static int read_scene(struct trace *t, int argc, char **argv, struct err *e)
 		return -1;
 	t->scene = view_scene_new(&t->m, t->rays, &t->h, e);
 	double ready = cli_seconds();
-	if (t->scene && !t->cli.quiet)
-		fprintf(t->results, "%s: %zu triangles, %zu elements, %d band%s; read in %.3f s, "
-		        "ray structure in %.3f s, interpolation in %.3f s\n", t->rad,
-		        t->m.triangles, t->m.elements, t->m.bands, t->m.bands == 1 ? "" : "s",
-		        read - begun, built - read, ready - built);
+	snprintf(t->ready, sizeof t->ready, "%s: %zu triangles, %zu elements, %d band%s; read "
+	         "in %.3f s, ray structure in %.3f s, interpolation in %.3f s", t->rad,
+	         t->m.triangles, t->m.elements, t->m.bands, t->m.bands == 1 ? "" : "s",
+	         read - begun, built - read, ready - built);
 	return t->scene ? 0 : -1;
 }
 
@@ -443,7 +444,7 @@ static int run(struct trace *t, int argc, char **argv, struct err *e)
 		if (!s->done && render(t, s, e))
 			return -1;
 	if (!t->cli.quiet)
-		fprintf(t->results, "peak memory %.0f MB\n", cli_peak_megabytes());
+		fprintf(t->results, "%s; peak memory %.0f MB\n", t->ready, cli_peak_megabytes());
 	return 0;
 }
 
