@@ -77,8 +77,10 @@ static inline const char *in_scratch(const char *name)
 
 static inline void put(const char *name, const void *data, size_t bytes)
 {
-	FILE *f = fopen(in_scratch(name), "wb");
+	FILE *f;
 
+	remove(in_scratch(name)); /* some file systems flush a file that is truncated */
+	f = fopen(in_scratch(name), "wb");
 	assert_non_null(f);
 	assert_int_equal(fwrite(data, 1, bytes, f), bytes);
 	assert_int_equal(fclose(f), 0);
