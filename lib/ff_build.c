@@ -29,7 +29,8 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 	int emits = any(&mt->emission[here], bands);
 	int plain = mt->emission_exponent[2 * material + (uint32_t)side] == 1;
 
-	if (!model_side_modelled(j->m, ps))
+	j->is_black[ps] = !model_side_modelled(j->m, ps);
+	if (j->is_black[ps])
 		return;
 	j->shoots_diffuse[ps] = (emits && plain) || any(&mt->rho_d[here], bands) ||
 	                        any(&mt->tau_d[there], bands);
@@ -48,24 +49,25 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, double x[3])
 {
 	const struct model *m = j->m;
-	uint32_t lo = m->patch_start[patch], hi = m->patch_start[patch + 1] - 1;
-	uint32_t first = lo;
-	double area = u0 * j->element_cdf[hi];
+	uint32_t first = m->patch_start[patch], lo = first, n = m->patch_start[patch + 1] - first;
+	double area = u0 * j->element_cdf[first + n - 1];
 
-	while (lo < hi) {
-		uint32_t mid = lo + (hi - lo) / 2;
-		if (j->element_cdf[mid] <= area)
-			lo = mid + 1;
-		else
-			hi = mid;
+	/* Binary search without branches to mispredict. */
+	while (n > 1) {
+		uint32_t half = n / 2;
+		lo += j->element_cdf[lo + half - 1] <= area ? half : 0;
+		n -= half;
 	}
 	double before = lo > first ? j->element_cdf[lo - 1] : 0;
 	double r = sqrt(fmin(1, fmax(0, (area - before) / (j->element_cdf[lo] - before))));
 	double w[3] = { 1 - r, r * (1 - u1), r * u1 }, inset = j->element_inset[lo];
-	x[0] = x[1] = x[2] = 0;
+	const uint32_t *corner = &m->element[3 * (size_t)lo];
 	for (int c = 0; c < 3; c++)
-		v3_mad(x, w[c] + inset * (1. / 3 - w[c]),
-		       &m->vertex[3 * (size_t)m->element[3 * (size_t)lo + (size_t)c]], x);
+		w[c] += inset * (1. / 3 - w[c]);
+	for (int k = 0; k < 3; k++)
+		x[k] = w[0] * m->vertex[3 * (size_t)corner[0] + (size_t)k] +
+		       w[1] * m->vertex[3 * (size_t)corner[1] + (size_t)k] +
+		       w[2] * m->vertex[3 * (size_t)corner[2] + (size_t)k];
 	return lo;
 }
 
@@ -107,17 +109,19 @@ static int job_arrays(struct ff_job *j, struct err *e)
 	j->shoots_lobe = mem_new(sides, 1, "patch flags", e);
 	j->has_lobe = mem_new(sides, 1, "patch flags", e);
 	j->is_source = mem_new(sides, 1, "patch flags", e);
+	j->is_black = mem_new(sides, 1, "patch flags", e);
 	j->is_ideal = mem_new(sides, 1, "patch flags", e);
 	j->sobol = mem_new((size_t)j->sobol_points * FF_DIMS, sizeof *j->sobol, "sample points", e);
 	return j->element_cdf && j->element_inset && j->shoots_diffuse && j->shoots_lobe &&
-	       j->has_lobe && j->is_source && j->is_ideal && j->sobol ? 0 : -1;
+	       j->has_lobe && j->is_source && j->is_ideal && j->is_black && j->sobol ? 0 : -1;
 }
 
 static int job_init(struct ff_job *j, const struct model *m, const struct ff_options *o,
                     struct err *e)
 {
 	*j = (struct ff_job){ .m = m, .o = *o };
-	if (job_arrays(j, e) || !(j->rays = ray_scene_new(m, e)))
+	if (job_arrays(j, e) || locator_init(&j->locator, m, e) ||
+	    !(j->rays = ray_scene_new(m, e)))
 		return -1;
 	if (o->method == FF_HEMICUBE && (hemi_grid_init(&j->grid, (int)o->rays, e) ||
 	                                 !(j->cubes = hemi_scene_new(m, e))))
@@ -134,10 +138,11 @@ static int job_init(struct ff_job *j, const struct model *m, const struct ff_opt
 static void job_free(struct ff_job *j)
 {
 	void *array[] = { j->element_cdf, j->element_inset, j->shoots_diffuse, j->shoots_lobe,
-		j->has_lobe, j->is_source, j->is_ideal, j->sobol };
+		j->has_lobe, j->is_source, j->is_ideal, j->is_black, j->sobol };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
+	locator_free(&j->locator);
 	ray_scene_free(j->rays);
 	hemi_scene_free(j->cubes);
 	hemi_grid_free(&j->grid);

@@ -5,6 +5,7 @@
 #include "ff_build.h"
 #include "ff_tally.h"
 #include "hemicube.h"
+#include "locate.h"
 #include "ray.h"
 #include "rng.h"
 
@@ -17,6 +18,8 @@ struct ff_job {
 	struct ray_scene *rays;
 	struct hemi_scene *cubes; /* hemicube only */
 	struct hemi_grid grid;
+	struct locator locator;
+	uint8_t *is_black;        /* [2P] not modelled: absorbs */
 	uint8_t *is_ideal;        /* [2P] sends light on along an ideal direction */
 	double *element_cdf;      /* [E] area of the patch's elements up to and with this */
 	double *element_inset;    /* [E] how far samples keep from the edges, barycentric */

@@ -25,9 +25,20 @@ static void capture(struct ff_thread *t, uint32_t source, uint32_t chain, double
 		vec_append(&t->captures, &c, 1, sizeof c, &t->tally.err);
 }
 
+/* Where a hit lies, from the triangle's corners: exact to the rounding of doubles. */
+static void hit_point(const struct model *m, const struct ray_hit *hit, double x[3])
+{
+	const uint32_t *corner = &m->triangle[3 * (size_t)hit->triangle];
+
+	for (int k = 0; k < 3; k++)
+		x[k] = hit->w[0] * m->vertex[3 * (size_t)corner[0] + (size_t)k] +
+		       hit->w[1] * m->vertex[3 * (size_t)corner[1] + (size_t)k] +
+		       hit->w[2] * m->vertex[3 * (size_t)corner[2] + (size_t)k];
+}
+
 /* Sends a flight on by ideal event `transmitted` from a hit, or books it as cut. */
-static int go_on(struct ff_thread *t, const struct flight *in, uint32_t element, int side,
-                 const double x[3], uint32_t slot, int transmitted, double w,
+static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_hit *hit,
+                 uint32_t element, uint32_t slot, int transmitted, double w,
                  struct flight *out)
 {
 	uint32_t chain = chains_child(&t->tally.chains, in->chain, slot, &t->tally.err);
@@ -39,11 +50,10 @@ static int go_on(struct ff_thread *t, const struct flight *in, uint32_t element,
 		tally_rest(&t->tally, chain)->cut += w;
 		return 0;
 	}
-	ff_normal(t->job, element, transmitted ? !side : side, n);
-	for (int k = 0; k < 3; k++) {
-		out->org[k] = x[k];
+	ff_normal(t->job, element, transmitted ? !hit->side : hit->side, n);
+	hit_point(t->job->m, hit, out->org);
+	for (int k = 0; k < 3; k++)
 		out->dir[k] = in->dir[k];
-	}
 	if (!transmitted)
 		v3_mad(in->dir, -2 * v3_dot(in->dir, n), n, out->dir);
 	ray_leave(t->job->rays, n, out->org);
@@ -52,75 +62,72 @@ static int go_on(struct ff_thread *t, const struct flight *in, uint32_t element,
 	return 1;
 }
 
-/* Tallies a flight's landing; returns how many flights (0 to 2) go on into next[].
- * A surface that both mirrors and passes splits the flight, the first few times;
- * later one way is drawn and counts double, which keeps the expectation. */
-static int land(struct ff_thread *t, const struct flight *in, uint32_t es, const double x[3],
-                struct flight next[2])
+/* What an ideal surface sends on: 0 to 2 flights into next[]. A surface that both
+ * mirrors and passes splits the flight, the first few times; later one way is drawn
+ * and counts double, which keeps the expectation. */
+static int reflect(struct ff_thread *t, const struct flight *in, const struct ray_hit *hit,
+                   uint32_t element, const uint32_t slot[2], struct flight next[2])
 {
-	const struct ff_job *j = t->job;
-	uint32_t patch = j->m->element_patch[es >> 1], ps = 2 * patch + (es & 1);
-	uint32_t id = 4 * model_patch_material(j->m, patch) + 2 * (es & 1);
-	const uint32_t *slot = j->m->material.n ? &t->tally.chains.slot[id] : NULL;
-	int side = (int)(es & 1), n = 0, both;
-	double w = in->w;
+	int both = slot[0] != CHAIN_NONE && slot[1] != CHAIN_NONE, drawn = -1, n = 0;
+	int splits = in->splits + both;
+	struct flight from = *in; /* next[0] may be the same place */
 
-	if (!model_side_modelled(j->m, ps)) {
-		tally_rest(&t->tally, in->chain)->black += w;
-		return 0;
-	}
-	tally_hit(&t->tally, in->chain, es, w, in->dir);
-	if (t->capturing)
-		capture(t, ps, in->chain, w);
-	if (slot[0] == CHAIN_NONE && slot[1] == CHAIN_NONE)
-		return 0;
-	both = slot[0] != CHAIN_NONE && slot[1] != CHAIN_NONE;
-	int drawn = -1;
 	if (both && in->splits >= MAX_SPLITS) {
 		drawn = (int)(rng_next(&t->rng) >> 63);
-		w *= 2;
+		from.w *= 2;
 	}
 	for (int transmitted = 0; transmitted < 2; transmitted++)
 		if (slot[transmitted] != CHAIN_NONE && drawn != !transmitted &&
-		    go_on(t, in, es >> 1, side, x, slot[transmitted], transmitted, w, &next[n])) {
-			next[n].splits = in->splits + both;
-			n++;
-		}
+		    go_on(t, &from, hit, element, slot[transmitted], transmitted, from.w, &next[n]))
+			next[n++].splits = splits;
 	return n;
 }
 
-static void fly(struct ff_thread *t, struct flight *stack, int n)
+/* Casts a flight, tallies where it lands; returns how many go on into next[], which
+ * may begin at the flight itself. */
+static int land(struct ff_thread *t, struct flight *f, struct flight next[2])
 {
-	const struct model *m = t->job->m;
+	const struct ff_job *j = t->job;
+	struct ray_hit hit;
 
-	while (n > 0) {
-		struct flight f = stack[--n];
-		struct ray_hit hit;
-		ray_nearest(t->job->rays, f.org, f.dir, &hit);
-		t->rays++;
-		if (hit.triangle == RAY_MISS) {
-			tally_rest(&t->tally, f.chain)->escape += f.w;
-			continue;
-		}
-		double x[3] = { 0 };
-		for (int c = 0; c < 3; c++)
-			v3_mad(x, hit.w[c],
-			       &m->vertex[3 * (size_t)m->triangle[3 * (size_t)hit.triangle + (size_t)c]], x);
-		uint32_t element = model_locate(m, hit.triangle, hit.w);
-		n += land(t, &f, 2 * element + (uint32_t)hit.side, x, &stack[n]);
+	ray_nearest(j->rays, f->org, f->dir, &hit);
+	t->rays++;
+	if (hit.triangle == RAY_MISS) {
+		tally_rest(&t->tally, f->chain)->escape += f->w;
+		return 0;
 	}
+	uint32_t element = locate(&j->locator, hit.triangle, hit.w);
+	uint32_t side = (uint32_t)hit.side, ps = 2 * j->m->element_patch[element] + side;
+	if (j->is_black[ps]) {
+		tally_rest(&t->tally, f->chain)->black += f->w;
+		return 0;
+	}
+	tally_hit(&t->tally, f->chain, 2 * element + side, f->w, f->dir);
+	if (t->capturing)
+		capture(t, ps, f->chain, f->w);
+	if (!j->is_ideal[ps])
+		return 0;
+	uint32_t id = 4 * model_patch_material(j->m, ps >> 1) + 2 * side;
+	return reflect(t, f, &hit, element, &t->tally.chains.slot[id], next);
 }
 
 void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], double w,
                uint32_t chain)
 {
-	struct flight stack[MAX_SPLITS + 3] = { { .w = w, .chain = chain } };
+	struct flight stack[MAX_SPLITS + 3];
+	int n = 1;
 
 	for (int k = 0; k < 3; k++) {
 		stack[0].org[k] = org[k];
 		stack[0].dir[k] = dir[k];
 	}
-	fly(t, stack, 1);
+	stack[0].w = w;
+	stack[0].chain = chain;
+	stack[0].splits = 0;
+	while (n > 0) {
+		n--;
+		n += land(t, &stack[n], &stack[n]);
+	}
 }
 
 /* ---- rows ---- */
