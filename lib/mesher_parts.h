@@ -3,6 +3,7 @@
 #ifndef TWOPASS_MESHER_PARTS_H
 #define TWOPASS_MESHER_PARTS_H
 
+#include "edges.h"
 #include "mesher.h"
 
 /* weld.c: finds points that are one. Points of different groups never are;
@@ -70,12 +71,31 @@ int subdivide(struct model *m, double size, struct err *e);
 /* regions.c: sets region[t] of input triangles: connected pieces of one surface,
  * plane or bending by less than the cone at each edge. */
 struct region {
-	uint32_t first;     /* lowest triangle */
 	double axis[3][3];  /* its own frame; axis[2] is the mean normal */
 };
 
 int find_regions(const struct model *m, double size, double cos_cone, uint32_t *region,
                  struct region **regions, size_t *count, struct err *e);
+
+/* What patches are made from. */
+struct division {
+	const struct model *m;
+	struct edges g;           /* of the elements */
+	double centre[3];         /* of the scene: coordinates are taken from here */
+	double *centroid;         /* [elements][3] about the centre */
+	double *area;             /* [elements][3] area vectors */
+	struct region *region;
+	uint32_t *element_region; /* [elements] */
+	double size, cos_cone;
+};
+
+/* Range of an element along an axis. */
+void division_extent(const struct division *d, uint32_t element, const double axis[3],
+                     double *lo, double *hi);
+
+/* merge.c: joins patches of one region that together are still small and flat
+ * enough. O(n log n) for well-shaped patches. */
+int merge_patches(const struct division *d, uint32_t *patch, size_t *count, struct err *e);
 
 /* patches.c: divides regions into patches: patch[element], *count of them. */
 int find_patches(const struct model *m, double size, double cos_cone, uint32_t *patch,

@@ -19,35 +19,27 @@ struct piece {
 };
 
 struct divider {
-	const struct model *m;
-	struct edges g;          /* of the elements */
-	double centre[3];        /* of the scene: differences are taken from here */
-	double *centroid;        /* [elements][3] */
-	double *area;            /* [elements][3] area vectors */
-	struct region *region;
+	struct division d;
 	uint32_t *order, *queue; /* [elements] */
 	uint32_t *label;         /* [elements] the piece being divided */
 	uint32_t *edge_label;    /* [edges] the search that has passed */
 	uint32_t labels;
 	struct vec todo;
-	double size, cos_cone;
 	struct err *e;
 };
 
-static double element_extent(const struct divider *d, uint32_t element, const double axis[3],
-                             double *low)
+void division_extent(const struct division *d, uint32_t element, const double axis[3],
+                     double *lo, double *hi)
 {
-	double lo = INFINITY, hi = -INFINITY, x[3];
+	const uint32_t *c = &d->m->element[3 * (size_t)element];
 
-	for (size_t k = 0; k < 3; k++) {
-		v3_sub(&d->m->vertex[3 * (size_t)d->m->element[3 * (size_t)element + k]],
-		       d->centre, x);
-		double at = v3_dot(x, axis);
-		lo = fmin(lo, at);
-		hi = fmax(hi, at);
+	*lo = INFINITY, *hi = -INFINITY;
+	for (int k = 0; k < 3; k++) {
+		double x[3];
+		v3_sub(&d->m->vertex[3 * (size_t)c[k]], d->centre, x);
+		*lo = fmin(*lo, v3_dot(x, axis));
+		*hi = fmax(*hi, v3_dot(x, axis));
 	}
-	*low = lo;
-	return hi;
 }
 
 /* Puts queue[begin, end) on the list of pieces, with its bounding box clipped to
@@ -60,11 +52,12 @@ static int push_piece(struct divider *d, uint32_t begin, uint32_t end,
 	p.begin = begin;
 	p.end = end;
 	for (int k = 0; k < 3; k++) {
-		double lo = INFINITY, hi = -INFINITY, low;
+		const double *axis = d->d.region[p.region].axis[k];
+		double lo = INFINITY, hi = -INFINITY, low, high;
 		for (uint32_t i = begin; i < end; i++) {
-			hi = fmax(hi, element_extent(d, d->queue[i], d->region[p.region].axis[k],
-			                             &low));
+			division_extent(&d->d, d->queue[i], axis, &low, &high);
 			lo = fmin(lo, low);
+			hi = fmax(hi, high);
 		}
 		p.lo[k] = fmax(p.lo[k], lo);
 		p.hi[k] = fmin(p.hi[k], hi);
@@ -77,12 +70,12 @@ static int push_piece(struct divider *d, uint32_t begin, uint32_t end,
 static uint32_t spread(struct divider *d, uint32_t element, uint32_t label, uint32_t tail)
 {
 	for (size_t k = 0; k < 3; k++) {
-		uint32_t edge = d->g.of[3 * (size_t)element + k];
+		uint32_t edge = d->d.g.of[3 * (size_t)element + k];
 		if (d->edge_label[edge] == label)
 			continue;
 		d->edge_label[edge] = label;
-		for (uint32_t u = d->g.start[edge]; u < d->g.start[edge + 1]; u++) {
-			uint32_t next = d->g.use[u] / 3;
+		for (uint32_t u = d->d.g.start[edge]; u < d->d.g.start[edge + 1]; u++) {
+			uint32_t next = d->d.g.use[u] / 3;
 			if (d->label[next] != label)
 				continue;
 			d->label[next] = 0;
@@ -130,8 +123,8 @@ static int cut(struct divider *d, const struct piece *p, int axis, double at)
 	uint32_t n = p->begin, above = p->begin;
 
 	for (uint32_t i = p->begin; i < p->end; i++)
-		if (v3_dot(&d->centroid[3 * (size_t)d->order[i]],
-		           d->region[p->region].axis[axis]) >= above_from)
+		if (v3_dot(&d->d.centroid[3 * (size_t)d->order[i]],
+		           d->d.region[p->region].axis[axis]) >= above_from)
 			d->queue[above++] = d->order[i];
 		else
 			d->order[n++] = d->order[i];
@@ -143,7 +136,7 @@ static int cut(struct divider *d, const struct piece *p, int axis, double at)
 /* The longest side of the box that exceeds the patch size, or -1. */
 static int too_long(const struct divider *d, const struct piece *p)
 {
-	double longest = d->size * (1 + 1e-6);
+	double longest = d->d.size * (1 + 1e-6);
 	int axis = -1;
 
 	for (int k = 0; k < 3; k++)
@@ -160,10 +153,10 @@ static int too_curved(const struct divider *d, const struct piece *p)
 	double mean[3] = { 0 };
 
 	for (uint32_t i = p->begin; i < p->end; i++)
-		v3_mad(mean, 1, &d->area[3 * (size_t)d->order[i]], mean);
-	double bound = d->cos_cone * v3_length(mean);
+		v3_mad(mean, 1, &d->d.area[3 * (size_t)d->order[i]], mean);
+	double bound = d->d.cos_cone * v3_length(mean);
 	for (uint32_t i = p->begin; i < p->end; i++) {
-		const double *n = &d->area[3 * (size_t)d->order[i]];
+		const double *n = &d->d.area[3 * (size_t)d->order[i]];
 		double length = v3_length(n);
 		if (!(v3_dot(n, mean) >= (bound - 1e-9 * v3_length(mean)) * length))
 			return 1;
@@ -185,12 +178,12 @@ static struct bend measure_bend(const struct divider *d, const struct piece *p, 
 	double n = p->end - p->begin, sx = 0, sxx = 0, sn[3] = { 0 }, sxn[3] = { 0 }, c[3];
 
 	for (uint32_t i = p->begin; i < p->end; i++) {
-		double normal[3], x = v3_dot(&d->centroid[3 * (size_t)d->order[i]],
-		                             d->region[p->region].axis[axis]);
+		double normal[3], x = v3_dot(&d->d.centroid[3 * (size_t)d->order[i]],
+		                             d->d.region[p->region].axis[axis]);
 		b.lo = fmin(b.lo, x);
 		b.hi = fmax(b.hi, x);
 		x -= .5 * (p->lo[axis] + p->hi[axis]);
-		memcpy(normal, &d->area[3 * (size_t)d->order[i]], sizeof normal);
+		memcpy(normal, &d->d.area[3 * (size_t)d->order[i]], sizeof normal);
 		v3_normalise(normal);
 		sx += x;
 		sxx += x * x;
@@ -246,7 +239,7 @@ static int divide(struct divider *d, uint32_t *patch, size_t *count)
 	return 0;
 }
 
-static void element_centroids(struct divider *d)
+static void element_centroids(struct division *d)
 {
 	const struct model *m = d->m;
 	double lo[3], hi[3];
@@ -268,46 +261,76 @@ static void element_centroids(struct divider *d)
 }
 
 /* Puts the regions on the list: order becomes the elements by region. */
-static int push_regions(struct divider *d, const uint32_t *region, size_t regions)
+static int push_regions(struct divider *d, size_t regions)
 {
-	const struct model *m = d->m;
-	const struct piece all = { .lo = { -INFINITY, -INFINITY, -INFINITY },
-		                   .hi = { INFINITY, INFINITY, INFINITY } };
+	const uint32_t *region = d->d.element_region;
 	uint32_t *start = mem_new(regions + 1, sizeof *start, "regions", d->e);
+	size_t n = d->d.m->elements;
 	int status = start ? 0 : -1;
 
-	for (size_t i = 0; start && i < m->elements; i++)
-		start[region[m->element_triangle[i]] + 1]++;
+	for (size_t i = 0; start && i < n; i++)
+		start[region[i] + 1]++;
 	for (size_t r = 0; start && r < regions; r++)
 		start[r + 1] += start[r];
-	for (size_t i = m->elements; start && i-- > 0;)
-		d->order[--start[region[m->element_triangle[i]] + 1]] = (uint32_t)i;
+	for (size_t i = n; start && i-- > 0;)
+		d->order[--start[region[i] + 1]] = (uint32_t)i;
 	/* start[r + 1] now is the beginning of region r. */
 	for (size_t r = 0; !status && r < regions; r++) {
-		struct piece p = all;
-		p.region = (uint32_t)r;
+		struct piece all = { .region = (uint32_t)r,
+			             .lo = { -INFINITY, -INFINITY, -INFINITY },
+			             .hi = { INFINITY, INFINITY, INFINITY } };
 		status = push_connected(d, start[r + 1],
-		                        r + 1 < regions ? start[r + 2] : (uint32_t)m->elements,
-		                        &p);
+		                        r + 1 < regions ? start[r + 2] : (uint32_t)n, &all);
 	}
 	free(start);
 	return status;
 }
 
+/* Which regions the elements belong to. */
+static int assign_regions(struct divider *d, size_t *regions)
+{
+	struct division *v = &d->d;
+	uint32_t *region = mem_new(v->m->triangles, sizeof *region, "regions", d->e);
+	int status = region ? find_regions(v->m, v->size, v->cos_cone, region, &v->region,
+	                                   regions, d->e)
+	                    : -1;
+
+	v->element_region = mem_new(v->m->elements, sizeof *v->element_region, "regions", d->e);
+	for (size_t i = 0; !status && v->element_region && i < v->m->elements; i++)
+		v->element_region[i] = region[v->m->element_triangle[i]];
+	free(region);
+	return v->element_region ? status : -1;
+}
+
 static int allocate(struct divider *d)
 {
-	size_t n = d->m->elements;
+	struct division *v = &d->d;
+	size_t n = v->m->elements;
 
-	if (edges_build(&d->g, d->m->element, n, d->m->vertices, d->e))
+	if (edges_build(&v->g, v->m->element, n, v->m->vertices, d->e))
 		return -1;
-	d->centroid = mem_new(n, 3 * sizeof *d->centroid, "patches", d->e);
-	d->area = mem_new(n, 3 * sizeof *d->area, "patches", d->e);
+	v->centroid = mem_new(n, 3 * sizeof *v->centroid, "patches", d->e);
+	v->area = mem_new(n, 3 * sizeof *v->area, "patches", d->e);
 	d->order = mem_new(n, sizeof *d->order, "patches", d->e);
 	d->queue = mem_new(n, sizeof *d->queue, "patches", d->e);
 	d->label = mem_new(n, sizeof *d->label, "patches", d->e);
-	d->edge_label = mem_new(d->g.n, sizeof *d->edge_label, "patches", d->e);
-	return d->centroid && d->area && d->order && d->queue && d->label && d->edge_label ? 0
+	d->edge_label = mem_new(v->g.n, sizeof *d->edge_label, "patches", d->e);
+	return v->centroid && v->area && d->order && d->queue && d->label && d->edge_label ? 0
 	                                                                                   : -1;
+}
+
+static void release(struct divider *d)
+{
+	edges_free(&d->d.g);
+	free(d->d.region);
+	free(d->d.element_region);
+	free(d->d.centroid);
+	free(d->d.area);
+	free(d->order);
+	free(d->queue);
+	free(d->label);
+	free(d->edge_label);
+	free(d->todo.data);
 }
 
 int find_patches(const struct model *m, double size, double cos_cone, uint32_t *patch,
@@ -315,27 +338,16 @@ int find_patches(const struct model *m, double size, double cos_cone, uint32_t *
 {
 	int status = -1;
 	size_t regions;
-	struct divider d = { .m = m, .size = size, .cos_cone = cos_cone, .e = e };
-	uint32_t *region = mem_new(m->triangles, sizeof *region, "regions", e);
+	struct divider d = { .d = { .m = m, .size = size, .cos_cone = cos_cone }, .e = e };
 
 	*count = 0;
-	if (!region || find_regions(m, size, cos_cone, region, &d.region, &regions, e) ||
-	    allocate(&d))
+	if (assign_regions(&d, &regions) || allocate(&d))
 		goto done;
-	element_centroids(&d);
-	if (push_regions(&d, region, regions))
+	element_centroids(&d.d);
+	if (push_regions(&d, regions) || divide(&d, patch, count))
 		goto done;
-	status = divide(&d, patch, count);
+	status = merge_patches(&d.d, patch, count, e);
 done:
-	edges_free(&d.g);
-	free(region);
-	free(d.region);
-	free(d.centroid);
-	free(d.area);
-	free(d.order);
-	free(d.queue);
-	free(d.label);
-	free(d.edge_label);
-	free(d.todo.data);
+	release(&d);
 	return status;
 }

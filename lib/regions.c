@@ -19,6 +19,7 @@ struct finder {
 	uint32_t *plane;      /* sets of coplanar neighbours */
 	uint32_t *region;     /* sets of neighbours that bend little */
 	uint8_t *large;       /* [triangles] of the lowest: the plane piece is large */
+	double origin[3];     /* a corner of the scene */
 	double noise;         /* what float32 positions may deviate from a plane, m */
 	double cos_cone;
 };
@@ -115,12 +116,8 @@ static int number_regions(struct finder *f, uint32_t *region, struct region **ou
 		region[t] = root == t ? (uint32_t)n++ : region[root];
 	}
 	*out = mem_new(n, sizeof **out, "regions", e);
-	if (!*out)
-		return -1;
-	for (size_t t = f->m->triangles; t-- > 0;)
-		(*out)[region[t]].first = (uint32_t)t;
 	*count = n;
-	return 0;
+	return *out ? 0 : -1;
 }
 
 /* The edge a region's frame follows. */
@@ -165,33 +162,89 @@ static void find_guides(const struct finder *f, const uint32_t *region, struct g
 		}
 }
 
-/* Frame: axis 0 along the guiding edge, axis 2 the mean normal where the region
- * has one, else the normal at the edge. It turns with the scene. */
-static void set_frame(const struct finder *f, const struct guide *g, const double sum[4],
-                      struct region *r)
+/* Frame: axis 0 along a half-edge, axis 2 the given unit normal. */
+static void frame_along(const struct model *m, uint32_t half, const double normal[3],
+                        double axis[3][3])
 {
-	const struct model *m = f->m;
-	double *u = r->axis[0], *n = r->axis[2];
+	double *u = axis[0], *n = axis[2];
 
-	memcpy(n, v3_length(sum) > .1 * sum[3] ? sum : &f->area[3 * (size_t)(g->half / 3)],
-	       3 * sizeof *n);
-	v3_normalise(n);
-	v3_sub(&m->vertex[3 * (size_t)half_to(m->triangle, g->half)],
-	       &m->vertex[3 * (size_t)half_from(m->triangle, g->half)], u);
+	memcpy(n, normal, 3 * sizeof *n);
+	v3_sub(&m->vertex[3 * (size_t)half_to(m->triangle, half)],
+	       &m->vertex[3 * (size_t)half_from(m->triangle, half)], u);
 	v3_normalise(u);
 	v3_mad(u, -v3_dot(u, n), n, u);
 	if (v3_normalise(u) < 1e-3)
-		v3_frame(n, u, r->axis[1]);
-	v3_cross(n, u, r->axis[1]);
+		v3_frame(n, u, axis[1]);
+	v3_cross(n, u, axis[1]);
+}
+
+/* A frame to choose from and the box of the region in it. */
+struct candidate {
+	double axis[3][3], lo[2], hi[2];
+};
+
+static void widen(struct candidate *c, const double x[3])
+{
+	for (int k = 0; k < 2; k++) {
+		c->lo[k] = fmin(c->lo[k], v3_dot(x, c->axis[k]));
+		c->hi[k] = fmax(c->hi[k], v3_dot(x, c->axis[k]));
+	}
+}
+
+static double girth(const struct candidate *c)
+{
+	return coarse(c->hi[0] - c->lo[0] + c->hi[1] - c->lo[1]);
+}
+
+/* The frames along the guiding edge and the other two edges of its triangle. The
+ * normal is the mean one where the region has one, else that at the edge. */
+static void propose(const struct finder *f, uint32_t half, const double sum[4],
+                    struct candidate c[3])
+{
+	const double *own = &f->area[3 * (size_t)(half / 3)];
+	double n[3];
+
+	memcpy(n, v3_length(sum) > .1 * sum[3] ? sum : own, sizeof n);
+	v3_normalise(n);
+	for (uint32_t k = 0; k < 3; k++) {
+		c[k] = (struct candidate){ .lo = { INFINITY, INFINITY },
+			                   .hi = { -INFINITY, -INFINITY } };
+		frame_along(f->m, half / 3 * 3 + (half + k) % 3, n, c[k].axis);
+	}
+}
+
+/* Every region gets the proposed frame with the smallest box around it: a
+ * rectangle's own, and for its half cut off along the diagonal the same. It turns
+ * with the scene. */
+static void choose_frames(const struct finder *f, const uint32_t *region,
+                          struct candidate *c, struct region *r, size_t count)
+{
+	const struct model *m = f->m;
+	double x[3];
+
+	for (size_t i = 0; i < 3 * m->triangles; i++)
+		for (size_t k = 0; k < 3; k++) {
+			v3_sub(&m->vertex[3 * (size_t)m->triangle[i]], f->origin, x);
+			widen(&c[3 * (size_t)region[i / 3] + k], x);
+		}
+	for (size_t i = 0; i < count; i++) {
+		const struct candidate *best = &c[3 * i];
+		for (size_t k = 1; k < 3; k++)
+			if (girth(&c[3 * i + k]) < girth(best))
+				best = &c[3 * i + k];
+		memcpy(r[i].axis, best->axis, sizeof r[i].axis);
+	}
 }
 
 static int set_frames(const struct finder *f, const uint32_t *region, struct region *r,
                       size_t count, struct err *e)
 {
 	struct guide *guide = mem_new(count, sizeof *guide, "regions", e);
+	struct candidate *c = mem_new(count, 3 * sizeof *c, "regions", e);
 	double *sum = mem_new(count, 4 * sizeof *sum, "regions", e);
+	int status = guide && c && sum ? 0 : -1;
 
-	if (guide && sum) {
+	if (!status) {
 		find_guides(f, region, guide);
 		for (size_t t = 0; t < f->m->triangles; t++) {
 			double *s = &sum[4 * (size_t)region[t]];
@@ -199,10 +252,11 @@ static int set_frames(const struct finder *f, const uint32_t *region, struct reg
 			s[3] += v3_length(&f->area[3 * t]);
 		}
 		for (size_t i = 0; i < count; i++)
-			set_frame(f, &guide[i], &sum[4 * i], &r[i]);
+			propose(f, guide[i].half, &sum[4 * i], &c[3 * i]);
+		choose_frames(f, region, c, r, count);
 	}
-	int status = guide && sum ? 0 : -1;
 	free(guide);
+	free(c);
 	free(sum);
 	return status;
 }
@@ -225,6 +279,7 @@ int find_regions(const struct model *m, double size, double cos_cone, uint32_t *
 		goto done;
 	scene_box(m, lo, hi);
 	v3_sub(hi, lo, diagonal);
+	memcpy(f.origin, lo, sizeof f.origin);
 	f.noise = 0x1p-23 * v3_length(diagonal);
 	triangle_areas(&f);
 	for_neighbours(&f, join_coplanar);
