@@ -314,11 +314,13 @@ static int check_directory(const char *path, struct err *e)
 	char *directory;
 	int bad = 0;
 
-	if (!slash || slash == path)
+	if (!slash)
 		return 0;
-	if (!(directory = mem_new((size_t)(slash - path) + 1, 1, "path", e)))
+	/* With its slash, so that a file in its place is told apart. */
+	size_t n = (size_t)(slash - path) + 1;
+	if (!(directory = mem_new(n + 1, 1, "path", e)))
 		return -1;
-	memcpy(directory, path, (size_t)(slash - path));
+	memcpy(directory, path, n);
 	if (access(directory, W_OK | X_OK))
 		bad = err_set(e, "%s: cannot write there: %s", path, strerror(errno));
 	free(directory);
