@@ -180,8 +180,7 @@ WRONG = [
     ("g['materials'][1]['emissiveFactor'] = [1, 1, -1]", "-1 is below 0"),
     ("g['materials'][1]['extensions']['KHR_materials_ior']['ior'] = .5", "ior: 0.5 is neither"),
     ("g['nodes'][1]['name'] = 'two\\nlines'; g['nodes'][1]['scale'] = [0, 1, 1]", "is singular"),
-    ("g['meshes'][0]['primitives'][0]['mode'] = 1; g['meshes'][1]['primitives'][0]['mode'] = 0",
-     "geometry"),
+    ("g['scenes'][0]['nodes'] = [3]", "geometry"),
 ]
 
 
