@@ -23,6 +23,8 @@ static int set_sizes(const struct model *m, const struct mesher_options *o,
 	r->diagonal = v3_length(d);
 	r->patch_size = metres(o->patch, r->diagonal);
 	r->element_size = metres(o->element, r->diagonal);
+	if (o->element_within_patch)
+		r->element_size = fmin(r->element_size, r->patch_size);
 	if (!isfinite(r->diagonal))
 		return err_set(e, "the scene is too large for double precision");
 	return 0;

@@ -20,6 +20,7 @@ struct mesher_size {
 struct mesher_options {
 	struct mesher_size patch;    /* longest side of a patch */
 	struct mesher_size element;  /* longest edge of an element */
+	int element_within_patch;    /* 1: no longer than the patch size either */
 	double normal_cone;          /* degrees: how far the elements of a grouped
 	                                patch may turn away from its mean normal */
 	const struct progress *progress; /* or NULL */

@@ -20,7 +20,7 @@ enum { OPT_CONE = 256, OPT_DIRECTIONAL, OPT_EXPONENT, OPT_LOBE, OPT_BANDS, OPT_C
 static const struct cli_option options[] = {
 	{ 'o', "output", "FILE", "write the mesh to FILE (.mesh; - is standard output)" },
 	{ 'p', "patch-size", "SIZE", "longest side of a patch: metres, 5% of the scene, inf (default 5%)" },
-	{ 'e', "element-size", "SIZE", "longest edge of an element (default 4%, at most the patch size)" },
+	{ 'e', "element-size", "SIZE", "longest edge of an element (default 4%, but within the patch size)" },
 	{ OPT_CONE, "normal-cone", "DEG", "how far normals in a curved patch may turn (default 20)" },
 	{ OPT_DIRECTIONAL, "min-directional", "X", "fold derived lobes below this share into diffuse (default .05)" },
 	{ OPT_EXPONENT, "min-exponent", "K", "fold derived lobes of lower exponent into diffuse (default 2)" },
@@ -72,20 +72,12 @@ static enum lobe_kind parse_lobe(const struct cli *c, const char *text)
 	return LOBE_RECIPROCAL;
 }
 
-/* The default element size, but no more than the patch size where that is known
- * to be smaller. */
-static struct mesher_size default_element(struct mesher_size patch)
-{
-	struct mesher_size usual = { .04, 1 };
-
-	return patch.relative && patch.value > usual.value ? usual : patch;
-}
-
 static void parse(struct cli *c, int argc, char **argv, struct request *r)
 {
-	int letter, element_given = 0;
+	int letter;
 
-	r->mesher = (struct mesher_options){ { .05, 1 }, { 0, 0 }, 20, NULL };
+	r->mesher = (struct mesher_options){ .patch = { .05, 1 }, .element = { .04, 1 },
+		                             .element_within_patch = 1, .normal_cone = 20 };
 	r->gltf = GLTF_OPTIONS_DEFAULT;
 	while ((letter = cli_next(c, argc, argv)) != -1) {
 		switch (letter) {
@@ -93,7 +85,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		case 'p': r->mesher.patch = parse_size(c, "--patch-size", optarg); break;
 		case 'e':
 			r->mesher.element = parse_size(c, "--element-size", optarg);
-			element_given = 1;
+			r->mesher.element_within_patch = 0;
 			break;
 		case OPT_CONE:
 			r->mesher.normal_cone = cli_number(c, "--normal-cone", optarg, 0, 80);
@@ -115,8 +107,6 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		cli_usage(c, "one glTF file is needed");
 	if (!r->output)
 		cli_usage(c, "an output is needed: -o FILE.mesh");
-	if (!element_given)
-		r->mesher.element = default_element(r->mesher.patch);
 	r->scene = argv[optind];
 }
 
@@ -146,9 +136,10 @@ static json_t *size_json(struct mesher_size s)
 
 static char *options_text(const struct request *r, struct err *e)
 {
-	return dump(json_pack("{s:o, s:o, s:f, s:f, s:o, s:s, s:i, s:b}",
+	return dump(json_pack("{s:o, s:o, s:b, s:f, s:f, s:o, s:s, s:i, s:b}",
 	                      "patch_size", size_json(r->mesher.patch),
 	                      "element_size", size_json(r->mesher.element),
+	                      "element_within_patch", r->mesher.element_within_patch,
 	                      "normal_cone", r->mesher.normal_cone,
 	                      "min_directional", r->gltf.min_directional,
 	                      "min_exponent", length_json(r->gltf.min_exponent),

@@ -177,7 +177,8 @@ static void transform(struct model *m, double scale, int turn, double offset)
 
 static struct mesher_options sizes(double patch, double element, int relative)
 {
-	return (struct mesher_options){ { patch, relative }, { element, relative }, 20, NULL };
+	return (struct mesher_options){ .patch = { patch, relative },
+		                        .element = { element, relative }, .normal_cone = 20 };
 }
 
 /* ---- what must hold for every model ---- */
@@ -829,6 +830,25 @@ static void test_soup(void **state)
 	model_free(&m);
 }
 
+/* Elements without a size of their own fit into patches. */
+static void test_element_within_patch(void **state)
+{
+	static const double patch[2] = { .125, 3 };
+
+	(void)state;
+	for (int i = 0; i < 2; i++) {
+		struct model m;
+		struct mesher_options o = sizes(patch[i], .25, 0);
+		make_square(&m);
+		o.element_within_patch = 1;
+		struct mesher_report r = run(&m, o);
+		assert_true(r.element_size == (i ? .25 : .125));
+		assert_int_equal(m.patches, i ? 1 : 64);
+		mesher_report_free(&r);
+		model_free(&m);
+	}
+}
+
 static void test_too_fine(void **state)
 {
 	struct model m;
@@ -856,6 +876,7 @@ int main(void)
 		cmocka_unit_test(test_degenerate), cmocka_unit_test(test_duplicates),
 		cmocka_unit_test(test_partial_sandwich), cmocka_unit_test(test_winding),
 		cmocka_unit_test(test_weld), cmocka_unit_test(test_soup),
+		cmocka_unit_test(test_element_within_patch),
 		cmocka_unit_test(test_too_fine),
 	};
 
