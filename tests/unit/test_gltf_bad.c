@@ -298,7 +298,7 @@ static void test_glb(void **state)
 		put("s.glb", bad, n);
 		refused("s.glb", words[i].message);
 	}
-	for (size_t k = 4; k < n; k++) {
+	for (size_t k = 4; k < n; k += k < 32 || k > n - 200 ? 1 : 37) {
 		put("s.glb", glb, k);
 		refused("s.glb", "GLB: truncated");
 	}
