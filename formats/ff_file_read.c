@@ -1,9 +1,11 @@
 #include "ff_file.h"
 
 #include <inttypes.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "../lib/mem.h"
 #include "fields.h"
 
 #define FORMAT "twopass.ff"
@@ -53,6 +55,7 @@ static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
 		{ &f->arrival_direction, "arrival_direction", DT_F32, 2, { f->arrivals, 3 } },
 		{ &f->link_target, "link_target", DT_U32, 1, { f->links } },
 		{ &f->link_source, "link_source", DT_U32, 1, { f->links } },
+		{ &f->link_last, "link_last", DT_U32, 1, { f->links } },
 		{ &f->link_chain, "link_chain", DT_U32, 1, { f->links } },
 		{ &f->link_direction, "link_direction", DT_F32, 2, { f->links, 3 } },
 		{ &f->link_row, "link_row", DT_U32, 2, { f->links, 2 } },
@@ -159,4 +162,41 @@ void ff_file_close(struct ff_file *f)
 	cache_info_free(&f->info);
 	container_close(f->container);
 	*f = (struct ff_file){ 0 };
+}
+
+static char *side_name(const char *surface, int several, uint32_t nth, uint32_t side,
+                       struct err *e)
+{
+	size_t size = strlen(surface) + 32;
+	char *name = mem_new(size, 1, "names of patch-sides", e);
+
+	if (name && several)
+		snprintf(name, size, "%s[%" PRIu32 "]:%c", surface, nth, "fb"[side]);
+	else if (name)
+		snprintf(name, size, "%s:%c", surface, "fb"[side]);
+	return name;
+}
+
+char **ff_file_side_names(const struct ff_file *f, struct err *e)
+{
+	const size_t sides = 2 * f->scene.patches;
+	char **name = mem_new(sides, sizeof *name, "names of patch-sides", e);
+	uint32_t *total = mem_new(f->surfaces, sizeof *total, "names of patch-sides", e);
+	uint32_t *so_far = mem_new(f->surfaces, sizeof *so_far, "names of patch-sides", e);
+	int failed = !name || !total || !so_far;
+
+	for (size_t p = 0; p < f->scene.patches && !failed; p++)
+		total[f->patch_surface[p]]++;
+	for (size_t ps = 0; ps < sides && !failed; ps++) {
+		uint32_t s = f->patch_surface[ps >> 1];
+		name[ps] = side_name(f->surface_name[s], total[s] > 1, so_far[s], ps & 1, e);
+		failed = !name[ps];
+		so_far[s] += ps & 1;
+	}
+	free(total);
+	free(so_far);
+	if (!failed)
+		return name;
+	cache_names_free(name, sides);
+	return NULL;
 }

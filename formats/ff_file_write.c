@@ -11,7 +11,7 @@
 enum grown {
 	ROW_SCALE, ROW_RESIDUAL, ROW_ERROR, ROW_BLOCK, BLOCK_START, BLOCK_ESCAPE, BLOCK_BLACK,
 	BLOCK_LOST, BLOCK_CUT, BLOCK_ARRIVAL, ROW_SIDE, ROW_SAMPLES, BLOCK_CHAIN, COLUMN, VALUE,
-	ARRIVAL_TARGET, ARRIVAL_DIRECTION, LINK_TARGET, LINK_SOURCE, LINK_CHAIN, LINK_DIRECTION,
+	ARRIVAL_TARGET, ARRIVAL_DIRECTION, LINK_TARGET, LINK_SOURCE, LINK_LAST, LINK_CHAIN, LINK_DIRECTION,
 	LINK_ROW, ROW_KIND, GROWN
 };
 
@@ -50,6 +50,7 @@ static int declare(struct ff_writer *w, struct err *e)
 		[ARRIVAL_DIRECTION] = { "arrival_direction", DT_F32, 3 },
 		[LINK_TARGET] = { "link_target", DT_U32, 1 },
 		[LINK_SOURCE] = { "link_source", DT_U32, 1 },
+		[LINK_LAST] = { "link_last", DT_U32, 1 },
 		[LINK_CHAIN] = { "link_chain", DT_U32, 1 },
 		[LINK_DIRECTION] = { "link_direction", DT_F32, 3 },
 		[LINK_ROW] = { "link_row", DT_U32, 2 },
@@ -181,6 +182,7 @@ static int put_rows_and_blocks(struct ff_writer *w, const struct ff *b, struct e
 		{ ARRIVAL_DIRECTION, b->arrival_direction, b->arrivals, 3 * sizeof(float) },
 		{ LINK_TARGET, b->link_target, b->links, sizeof *b->link_target },
 		{ LINK_SOURCE, b->link_source, b->links, sizeof *b->link_source },
+		{ LINK_LAST, b->link_last, b->links, sizeof *b->link_last },
 		{ LINK_CHAIN, b->link_chain, b->links, sizeof *b->link_chain },
 		{ LINK_DIRECTION, b->link_direction, b->links, 3 * sizeof(float) },
 	};

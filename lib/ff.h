@@ -14,10 +14,11 @@
  * and the others close against the ideal entries that feed them.
  *
  * A LINK belongs to a patch-side ("target") with a finite lobe and names a
- * source of light as the target sees it: the patch-side that the light left and
- * the chain it came by. Its rows are the directional form factors G of eq. (3)
- * of the paper for light from that source: one about R, one about T. Links with
- * source FF_ANY stand for a direction bin and serve sources without their own. */
+ * source of light as the target sees it: the patch-sides that the light left (an
+ * emitter by itself, other sources in runs of neighbours that look alike from the
+ * target) and the chain it came by. Its rows are the directional form factors G of
+ * eq. (3) of the paper for light from that source: one about R, one about T. Links
+ * with source FF_ANY stand for a direction bin and serve sources without their own. */
 #ifndef TWOPASS_FF_H
 #define TWOPASS_FF_H
 
@@ -73,8 +74,9 @@ struct ff {
 	float *arrival_direction; /* [arrivals][3] */
 
 	size_t links;
-	uint32_t *link_target;    /* ascending; then by source, chain */
-	uint32_t *link_source;    /* patch-side or FF_ANY */
+	uint32_t *link_target;    /* ascending; then by chain, source */
+	uint32_t *link_source;    /* first patch-side, or FF_ANY */
+	uint32_t *link_last;      /* last patch-side (the same), or FF_ANY */
 	uint32_t *link_chain;
 	float *link_direction;    /* [links][3] mean direction to the source */
 	uint32_t *link_row;       /* [links][2] rows about R and T, or FF_NO_ROW */

@@ -32,6 +32,7 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 	j->is_black[ps] = !model_side_modelled(j->m, ps);
 	if (j->is_black[ps])
 		return;
+	j->emits[ps] = (uint8_t)emits;
 	j->shoots_diffuse[ps] = (emits && plain) || any(&mt->rho_d[here], bands) ||
 	                        any(&mt->tau_d[there], bands);
 	j->shoots_lobe[ps] = emits && !plain;
@@ -108,12 +109,13 @@ static int job_arrays(struct ff_job *j, struct err *e)
 	j->shoots_diffuse = mem_new(sides, 1, "patch flags", e);
 	j->shoots_lobe = mem_new(sides, 1, "patch flags", e);
 	j->has_lobe = mem_new(sides, 1, "patch flags", e);
+	j->emits = mem_new(sides, 1, "patch flags", e);
 	j->is_source = mem_new(sides, 1, "patch flags", e);
 	j->is_black = mem_new(sides, 1, "patch flags", e);
 	j->is_ideal = mem_new(sides, 1, "patch flags", e);
 	j->sobol = mem_new((size_t)j->sobol_points * FF_DIMS, sizeof *j->sobol, "sample points", e);
 	return j->element_cdf && j->element_inset && j->shoots_diffuse && j->shoots_lobe &&
-	       j->has_lobe && j->is_source && j->is_ideal && j->is_black && j->sobol ? 0 : -1;
+	       j->has_lobe && j->is_source && j->emits && j->is_ideal && j->is_black && j->sobol ? 0 : -1;
 }
 
 static int job_init(struct ff_job *j, const struct model *m, const struct ff_options *o,
@@ -138,7 +140,7 @@ static int job_init(struct ff_job *j, const struct model *m, const struct ff_opt
 static void job_free(struct ff_job *j)
 {
 	void *array[] = { j->element_cdf, j->element_inset, j->shoots_diffuse, j->shoots_lobe,
-		j->has_lobe, j->is_source, j->is_ideal, j->is_black, j->sobol };
+		j->has_lobe, j->is_source, j->emits, j->is_ideal, j->is_black, j->sobol };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);

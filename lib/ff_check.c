@@ -230,14 +230,15 @@ static int check_link_row(const struct ff *f, size_t l, int transmitted, struct 
 	return 0;
 }
 
-/* By target, then source, then chain; only direction bins may repeat. */
+/* By target, then chain, then source; runs of sources do not overlap, only
+ * direction bins may repeat. */
 static int link_order(const struct ff *f, size_t l)
 {
-	const uint32_t *key[] = { f->link_target, f->link_source, f->link_chain };
+	const uint32_t *key[] = { f->link_target, f->link_chain, f->link_source };
 
 	for (size_t k = 0; k < sizeof key / sizeof *key; k++)
 		if (key[k][l] != key[k][l - 1])
-			return key[k][l] > key[k][l - 1];
+			return key[k][l] > (k == 2 ? f->link_last : key[k])[l - 1];
 	return f->link_source[l] == FF_ANY;
 }
 
@@ -251,6 +252,10 @@ static int check_links(const struct ff *f, size_t patches, struct err *e)
 		if (f->link_source[l] != FF_ANY && f->link_source[l] >= 2 * patches)
 			return err_set(e, "array link_source: value %zu is %" PRIu32, l,
 			               f->link_source[l]);
+		if (f->link_last[l] < f->link_source[l] ||
+		    (f->link_source[l] != FF_ANY && f->link_last[l] >= 2 * patches))
+			return err_set(e, "array link_last: value %zu is %" PRIu32, l,
+			               f->link_last[l]);
 		if (l && !link_order(f, l))
 			return err_set(e, "array link_target: link %zu is out of order", l);
 		if (check_link_row(f, l, 0, e) || check_link_row(f, l, 1, e))

@@ -26,6 +26,7 @@ struct ff_job {
 	uint8_t *shoots_diffuse;  /* [2P] light can leave this side Lambertian */
 	uint8_t *shoots_lobe;     /* [2P] ... by an emission lobe */
 	uint8_t *has_lobe;        /* [2P] light arriving here leaves by a finite lobe */
+	uint8_t *emits;           /* [2P] gives light of its own */
 	uint8_t *is_source;       /* [2P] any light leaves here */
 	uint32_t *sobol;          /* [sobol_points][FF_DIMS] bits */
 	uint32_t sobol_points;

@@ -21,7 +21,8 @@
 
 enum {
 	MIN_LOBE_RAYS = 64,   /* for any one link and lobe */
-	PROBES = 4,           /* point pairs tried for sources that no ray met */
+	CLUSTER_SHARE = 128,  /* sources are joined up to one CLUSTER_SHARE-th of the rays */
+	PROBES = 4,           /* point pairs tried for emitters that no ray met */
 	BIN_RINGS = 3, BIN_SECTORS = 8
 };
 
@@ -34,10 +35,12 @@ struct order {
 static int by_source(const void *a, const void *b)
 {
 	const struct order *x = a, *y = b;
+	int d = x->c.chain == y->c.chain ? 0 : chains_compare(x->chains, x->c.chain, y->c.chain);
+	if (d)
+		return d;
 	if (x->c.source != y->c.source)
 		return x->c.source < y->c.source ? -1 : 1;
-	int d = chains_compare(x->chains, x->c.chain, y->c.chain);
-	return d ? d : (x->index > y->index) - (x->index < y->index);
+	return (x->index > y->index) - (x->index < y->index);
 }
 
 static int sort_captures(struct ff_thread *t, struct err *e)
@@ -58,14 +61,15 @@ static int sort_captures(struct ff_thread *t, struct err *e)
 	return 0;
 }
 
-/* Tries a few straight lines from the patch-side to every source that none of its
- * rays met by chain 0, and captures those that are clear. O(sources). */
+/* Tries a few straight lines from the patch-side to every emitter that none of its
+ * rays met by chain 0, and captures those that are clear: a small lamp far away may
+ * well be missed, yet its highlight is what is seen. O(emitters). */
 static int probe_unseen(struct ff_thread *t, uint32_t ps, const uint8_t *met, struct err *e)
 {
 	const struct ff_job *j = t->job;
 
 	for (uint32_t q = 0; q < 2 * j->m->patches; q++) {
-		if (met[q] || !j->is_source[q] || q >> 1 == ps >> 1)
+		if (met[q] || !j->emits[q] || q >> 1 == ps >> 1)
 			continue;
 		uint64_t seed = rng_mix(j->o.seed ^ (((uint64_t)ps << 32) | q));
 		for (uint32_t i = 0; i < PROBES; i++) {
@@ -205,7 +209,8 @@ static int put_link(struct ff_thread *t, uint32_t ps, const struct capture *c, s
 			return -1;
 	}
 	return vec_append(&b->link_target, &ps, 1, sizeof ps, e) ||
-	       vec_append(&b->link_source, &c->source, 1, sizeof c->source, e) ||
+	       vec_append(&b->link_source, &c[0].source, 1, sizeof c->source, e) ||
+	       vec_append(&b->link_last, &c[n - 1].source, 1, sizeof c->source, e) ||
 	       vec_append(&b->link_chain, &c->chain, 1, sizeof c->chain, e) ||
 	       vec_append(&b->link_direction, direction, 3, sizeof *direction, e) ||
 	       vec_append(&b->link_row, row, 2, sizeof *row, e) ? -1 : 0;
@@ -238,6 +243,29 @@ static int bin_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct 
 	return bad;
 }
 
+/* The end of the cluster that begins at capture i, and its weight: an emitter by
+ * itself; other sources while they come by the same chain, from within a narrow cone
+ * about the first (patches are numbered along a spatial tree, so neighbours in number
+ * are mostly neighbours in space), and until they weigh enough for a row of their own.
+ * Light from within a cluster is spread over it as its form factors are. */
+static size_t cluster_end(const struct ff_job *j, const struct capture *c, size_t i, size_t n,
+                          double enough, double *w)
+{
+	const double narrow = .97; /* cos 14 degrees */
+	size_t end = i;
+
+	while (end < n && c[end].chain == c[i].chain) {
+		uint32_t source = c[end].source;
+		if (source != c[i].source &&
+		    (*w >= enough || j->emits[source] || j->emits[c[i].source] ||
+		     v3_dot(c[end].l, c[i].l) < narrow))
+			break;
+		while (end < n && c[end].chain == c[i].chain && c[end].source == source)
+			*w += c[end++].w;
+	}
+	return end;
+}
+
 int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch *b,
              struct err *e)
 {
@@ -259,9 +287,7 @@ int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch
 	c = t->captures.data;
 	for (size_t i = 0, end; !bad && i < t->captures.n; i = end) {
 		double w = 0;
-		for (end = i; end < t->captures.n && c[end].source == c[i].source &&
-		              c[end].chain == c[i].chain; end++)
-			w += c[end].w;
+		end = cluster_end(j, c, i, t->captures.n, all / CLUSTER_SHARE, &w);
 		double share = all > 0 ? fmin(1, w / all) : 0;
 		uint32_t rays = (uint32_t)(share * j->o.lobe_rays);
 		bad = put_link(t, ps, &c[i], end - i, rays > MIN_LOBE_RAYS ? rays : MIN_LOBE_RAYS,

@@ -202,13 +202,8 @@ static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struc
 {
 	const struct ff_job *j = t->job;
 	uint32_t material = model_patch_material(j->m, ps >> 1);
-	const double *emission = &j->m->material.emission[material_at(&j->m->material, material,
-	                                                              (int)(ps & 1))];
-	uint32_t rays = j->o.rays;
+	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
 
-	for (int k = 0; k < j->m->bands; k++)
-		if (emission[k] > 0)
-			rays = j->o.rays * j->o.emitter_gain;
 	t->rng = rng_seed(j->o.seed, ps);
 	t->captures.n = 0;
 	if (j->shoots_diffuse[ps] || j->has_lobe[ps]) {

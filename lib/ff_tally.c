@@ -414,7 +414,7 @@ static int map_chain(uint32_t *chain, const struct chains *local, struct vec *ma
 }
 
 struct link {
-	uint32_t target, source, chain, row[2], order;
+	uint32_t target, source, last, chain, row[2], order;
 	float direction[3];
 };
 
@@ -423,10 +423,10 @@ static int by_link(const void *a, const void *b)
 	const struct link *x = a, *y = b;
 	if (x->target != y->target)
 		return x->target < y->target ? -1 : 1;
-	if (x->source != y->source)
-		return x->source < y->source ? -1 : 1;
 	if (x->chain != y->chain)
 		return x->chain < y->chain ? -1 : 1;
+	if (x->source != y->source)
+		return x->source < y->source ? -1 : 1;
 	return (x->order > y->order) - (x->order < y->order);
 }
 
@@ -435,13 +435,14 @@ static int sort_links(struct ff_batch *b, struct err *e)
 	size_t n = b->link_target.n;
 	struct link *l = mem_new(n, sizeof *l, "links", e);
 	uint32_t *target = b->link_target.data, *source = b->link_source.data;
+	uint32_t *last = b->link_last.data;
 	uint32_t *chain = b->link_chain.data, *row = b->link_row.data;
 	float *direction = b->link_direction.data;
 
 	if (!l)
 		return -1;
 	for (size_t i = 0; i < n; i++) {
-		l[i] = (struct link){ target[i], source[i], chain[i],
+		l[i] = (struct link){ target[i], source[i], last[i], chain[i],
 		                      { row[2 * i], row[2 * i + 1] }, (uint32_t)i, { 0 } };
 		memcpy(l[i].direction, &direction[3 * i], sizeof l[i].direction);
 	}
@@ -450,6 +451,7 @@ static int sort_links(struct ff_batch *b, struct err *e)
 	for (size_t i = 0; i < n; i++) {
 		target[i] = l[i].target;
 		source[i] = l[i].source;
+		last[i] = l[i].last;
 		chain[i] = l[i].chain;
 		memcpy(&row[2 * i], l[i].row, sizeof l[i].row);
 		memcpy(&direction[3 * i], l[i].direction, sizeof l[i].direction);
@@ -486,7 +488,8 @@ struct ff batch_view(const struct ff_batch *b)
 		.arrivals = b->arrival_target.n, .arrival_target = b->arrival_target.data,
 		.arrival_direction = b->arrival_direction.data,
 		.links = b->link_target.n, .link_target = b->link_target.data,
-		.link_source = b->link_source.data, .link_chain = b->link_chain.data,
+		.link_source = b->link_source.data, .link_last = b->link_last.data,
+		.link_chain = b->link_chain.data,
 		.link_direction = b->link_direction.data, .link_row = b->link_row.data,
 	};
 	return f;
@@ -498,7 +501,7 @@ void batch_free(struct ff_batch *b)
 		&b->row_residual, &b->row_error, &b->row_block, &b->block_chain,
 		&b->block_start, &b->escape, &b->black, &b->lost, &b->cut, &b->block_arrival,
 		&b->column, &b->value, &b->arrival_target, &b->arrival_direction,
-		&b->link_target, &b->link_source, &b->link_chain, &b->link_direction,
+		&b->link_target, &b->link_source, &b->link_last, &b->link_chain, &b->link_direction,
 		&b->link_row };
 
 	for (size_t i = 0; i < sizeof v / sizeof *v; i++)

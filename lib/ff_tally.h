@@ -42,7 +42,7 @@ struct ff_batch {
 	struct vec row_block, block_chain, block_start, escape, black, lost, cut;
 	struct vec block_arrival, column, value;
 	struct vec arrival_target, arrival_direction;
-	struct vec link_target, link_source, link_chain, link_direction, link_row;
+	struct vec link_target, link_source, link_last, link_chain, link_direction, link_row;
 };
 
 int tally_init(struct tally *t, const struct model *m, const uint8_t *has_lobe,

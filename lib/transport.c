@@ -121,7 +121,7 @@ static void put_rows(struct transport *t, uint32_t shard, const uint32_t *chain,
 /* ---- links ---- */
 
 struct link_key {
-	uint32_t target, source, chain, row[2];
+	uint32_t target, source, last, chain, row[2];
 	float direction[3];
 };
 
@@ -130,10 +130,10 @@ static int by_link(const void *a, const void *b)
 	const struct link_key *x = a, *y = b;
 	if (x->target != y->target)
 		return x->target < y->target ? -1 : 1;
-	if (x->source != y->source)
-		return x->source < y->source ? -1 : 1;
 	if (x->chain != y->chain)
 		return x->chain < y->chain ? -1 : 1;
+	if (x->source != y->source)
+		return x->source < y->source ? -1 : 1;
 	return (x->row[0] > y->row[0]) - (x->row[0] < y->row[0]);
 }
 
@@ -141,7 +141,7 @@ static void put_links(const struct ff *f, const uint32_t *chain, uint32_t row,
                       struct link_key *to)
 {
 	for (size_t i = 0; i < f->links; i++) {
-		to[i] = (struct link_key){ f->link_target[i], f->link_source[i],
+		to[i] = (struct link_key){ f->link_target[i], f->link_source[i], f->link_last[i],
 		                           chain[f->link_chain[i]], { FF_NO_ROW, FF_NO_ROW }, { 0 } };
 		for (int k = 0; k < 2; k++)
 			if (f->link_row[2 * i + (size_t)k] != FF_NO_ROW)
@@ -174,19 +174,22 @@ static uint32_t find_link(const struct transport *t, const struct link_key *l, u
                           uint32_t source, uint32_t chain, const float *from, uint32_t *guessed)
 {
 	size_t lo = t->target_link[target], hi = t->target_link[target + 1], end = hi;
-	struct link_key want = { .target = target, .source = source, .chain = chain };
+	struct link_key want = { .target = target, .source = source, .chain = chain,
+	                         .row = { UINT32_MAX, 0 } };
 	float best = -2;
 
+	/* The last link that does not begin beyond the source. */
 	for (size_t n = lo; n < hi;) {
 		size_t mid = n + (hi - n) / 2;
-		if (by_link(&l[mid], &want) < 0)
+		if (by_link(&l[mid], &want) <= 0)
 			n = mid + 1;
 		else
 			hi = mid;
 	}
-	*guessed = !(hi < end && l[hi].source == source && l[hi].chain == chain);
+	*guessed = !(hi > lo && l[hi - 1].chain == chain && l[hi - 1].source <= source &&
+	             l[hi - 1].last >= source);
 	if (!*guessed)
-		return (uint32_t)hi;
+		return (uint32_t)(hi - 1);
 	size_t found = lo;
 	for (size_t i = lo; i < end; i++) {
 		const float *d = l[i].direction;

@@ -42,7 +42,7 @@ struct transport {
 	struct block *block;             /* [blocks+1] */
 	struct run *run;
 
-	size_t links;                    /* sorted by target, source, chain */
+	size_t links;                    /* sorted by target, chain, source */
 	uint32_t *link_target;
 	uint32_t *link_row;              /* [links][2] */
 	uint64_t *target_link;           /* [2P+1] first link of a patch-side */

@@ -63,6 +63,7 @@ static inline int memory_put(void *arg, const struct ff *b, struct err *e)
 	GROW(arrival_direction, f->arrivals, b->arrivals, 3);
 	GROW(link_target, f->links, b->links, 1);
 	GROW(link_source, f->links, b->links, 1);
+	GROW(link_last, f->links, b->links, 1);
 	GROW(link_chain, f->links, b->links, 1);
 	GROW(link_direction, f->links, b->links, 3);
 	GROW(link_row, f->links, b->links, 2);

@@ -125,7 +125,7 @@ static inline void small_ff(struct ff *f)
 		.block_arrival = COPY(block_arrival), .column = COPY(column),
 		.value = COPY(value), .arrival_target = COPY(target),
 		.arrival_direction = COPY(up), .link_target = COPY(target),
-		.link_source = COPY(source), .link_chain = COPY(chain),
+		.link_source = COPY(source), .link_last = COPY(source), .link_chain = COPY(chain),
 		.link_direction = COPY(up), .link_row = COPY(rows) };
 }
 
