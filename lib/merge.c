@@ -186,7 +186,8 @@ static int find_borders(struct merger *g, uint32_t group)
 	struct border *b = g->border.data;
 	for (size_t i = 0; i < g->border.n; i++)
 		b[i].length = coarse(b[i].length);
-	qsort(b, g->border.n, sizeof *b, compare_borders);
+	if (g->border.n > 1)
+		qsort(b, g->border.n, sizeof *b, compare_borders);
 	return 0;
 }
 
