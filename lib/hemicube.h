@@ -38,7 +38,9 @@ void hemi_grid_free(struct hemi_grid *g);
  * frame) falls into. Directions below the horizon give its lowest row. O(1). */
 size_t hemicube_lookup(const struct hemi_grid *g, const double direction[3]);
 
-/* All elements of a model, arranged for drawing. */
+/* All elements of a model, arranged for drawing. Elements are drawn, not the input
+ * triangles they came from: to find the elements of the pixels afterwards costs
+ * more than to draw up to some 100 000 of them. */
 struct hemi_scene;
 
 /* O(elements log elements). m may be freed before it. NULL and e on failure. */
@@ -65,7 +67,8 @@ void hemicube_free(struct hemicube *h);
  * sees; of equal depths the lowest element-side wins. Nothing in the horizon
  * plane is seen, and there is no near plane: whatever stands above the horizon
  * plane by more than the rounding of world coordinates blocks.
- * O(elements above the horizon + pixels); no allocation. */
+ * O(elements + pixels), with groups of elements below the horizon or behind what
+ * is nearer passed over; no allocation. */
 void hemicube_render(struct hemicube *h, const struct hemi_scene *s, const double eye[3],
                      const double frame[3][3], uint32_t own);
 
