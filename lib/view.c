@@ -241,17 +241,12 @@ static void trace_pixel(const struct render *r, struct view_walker *w,
 {
 	uint64_t id = (uint64_t)j * (uint64_t)r->f->width + (uint64_t)i, seed = rng_mix(id);
 	int bands = r->v->m->bands, n = r->o->samples;
-	/* Each pixel shifts the common pattern, so that none repeats. */
-	double dx = n > 1 ? (double)(seed >> 32) * 0x1p-32 : 0;
-	double dy = n > 1 ? (double)(seed & 0xffffffffu) * 0x1p-32 : 0;
 
 	memset(w->diffuse, 0, (size_t)bands * sizeof *w->diffuse);
 	memset(w->directional, 0, (size_t)bands * sizeof *w->directional);
 	memset(w->emission, 0, (size_t)bands * sizeof *w->emission);
 	for (int s = 0; s < n; s++) {
-		double x = r->spot[s][0] + dx, y = r->spot[s][1] + dy;
-		camera_ray(r->f, i + (x < 1 ? x : x - 1), j + (y < 1 ? y : y - 1), b->org,
-		           b->dir);
+		camera_ray(r->f, i + r->spot[s][0], j + r->spot[s][1], b->org, b->dir);
 		b->index = (uint32_t)s;
 		b->seed = seed;
 		view_follow(w, b);
@@ -304,6 +299,16 @@ static void trace_tiles(void *arg, size_t begin, size_t end, int thread)
 	}
 }
 
+/* The bits of i mirrored at the point: .0, .1, .01, .11, .001, ... (van der Corput). */
+static double radical_inverse(uint32_t i)
+{
+	double x = 0;
+
+	for (double bit = .5; i; i >>= 1, bit /= 2)
+		x += bit * (i & 1);
+	return x;
+}
+
 static int new_buffers(struct render *r, size_t tiles, struct err *e)
 {
 	int n = r->o->samples;
@@ -317,9 +322,11 @@ static int new_buffers(struct render *r, size_t tiles, struct err *e)
 		if (!(r->stack[t] = mem_new(view_stack_size(r->o), sizeof **r->stack,
 		                            "ray stacks", e)))
 			return -1;
-	for (int i = 0; i < n; i++)
-		for (int k = 0; k < 2; k++)
-			r->spot[i][k] = n == 1 ? .5 : rng_sobol((uint32_t)i, k, 0);
+	/* Hammersley points, the same in every pixel: edges come out regular. */
+	for (int i = 0; i < n; i++) {
+		r->spot[i][0] = (i + .5) / n;
+		r->spot[i][1] = radical_inverse((uint32_t)i) + .5 / n;
+	}
 	return 0;
 }
 
