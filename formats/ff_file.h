@@ -47,4 +47,9 @@ int ff_file_open(const char *path, const struct model *m, const struct cache_inf
                  struct ff_file *out, struct err *e);
 void ff_file_close(struct ff_file *f);
 
+/* Names of all 2 patches patch-sides: "floor:f", or "floor[3]:b" where a surface has
+ * several patches (counted from 0 in the file's order). NULL and e when out of
+ * memory; release with cache_names_free(names, 2 patches). */
+char **ff_file_side_names(const struct ff_file *f, struct err *e);
+
 #endif

@@ -1,0 +1,527 @@
+/* inspect: what is in a .mesh, .ff or .rad file, and whether it is right. */
+#include <getopt.h>
+#include <inttypes.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "../formats/array_stats.h"
+#include "../formats/atomic_file.h"
+#include "../formats/ff_file.h"
+#include "../formats/mesh_file.h"
+#include "../formats/npy_file.h"
+#include "../formats/rad_file.h"
+#include "../lib/mem.h"
+#include "../lib/patch_matrix.h"
+#include "../lib/side_table.h"
+#include "../lib/verify.h"
+#include "common/cli.h"
+
+#define PATCH_MATRIX "patch-matrix"
+
+static const struct cli_option options[] = {
+	{ 'J', "json", NULL, "print JSON" },
+	{ 'V', "verify", NULL, "check digests, structure and physics; exit 1 if anything is wrong" },
+	{ 'c', "csv", NULL, "print a line for each element-side (.mesh, .rad)" },
+	{ 'r', "row", "I", "print row I (.ff) or element-side I (.mesh, .rad)" },
+	{ 'p', PATCH_MATRIX, NULL, "print form factors between patch-sides as CSV (.ff)" },
+	{ 'n', "npy", "ARRAY", "write ARRAY, or " PATCH_MATRIX ", as .npy" },
+	{ 'o', "output", "FILE", "where --npy goes (default standard output)" },
+	{ 0, NULL, NULL, NULL }
+};
+
+struct request {
+	const char *file, *npy, *output;
+	int json, verify, csv, matrix;
+	long row; /* negative: not asked for */
+};
+
+/* The file as its kind has it; the rest is zero. */
+struct content {
+	struct container *container;
+	const char *format;
+	struct model model;
+	struct solution solution;
+	struct ff_file ff;
+	struct cache_info info;
+};
+
+static void parse(struct cli *c, int argc, char **argv, struct request *r)
+{
+	int letter;
+
+	*r = (struct request){ .row = -1 };
+	while ((letter = cli_next(c, argc, argv)) != -1) {
+		switch (letter) {
+		case 'J': r->json = 1; break;
+		case 'V': r->verify = 1; break;
+		case 'c': r->csv = 1; break;
+		case 'r': r->row = cli_integer(c, "--row", optarg, 0, UINT32_MAX); break;
+		case 'p': r->matrix = 1; break;
+		case 'n': r->npy = optarg; break;
+		case 'o': r->output = optarg; break;
+		}
+	}
+	if (argc - optind != 1)
+		cli_usage(c, "one .mesh, .ff or .rad file is needed");
+	r->file = argv[optind];
+	if (r->csv + r->matrix + (r->row >= 0) + (r->npy != NULL) + (r->json || r->verify) > 1)
+		cli_usage(c, "--json (with or without --verify), --csv, --row, --patch-matrix and "
+		             "--npy are different outputs; ask for one");
+	if (r->output && !r->npy)
+		cli_usage(c, "--output is where --npy goes; redirect other output");
+}
+
+static void content_free(struct content *x)
+{
+	container_close(x->container);
+	ff_file_close(&x->ff);
+	solution_free(&x->solution);
+	model_free(&x->model);
+	cache_info_free(&x->info);
+}
+
+/* Reads the whole file with all checks that other tools make. */
+static int read_content(const struct request *r, struct content *x, struct err *e)
+{
+	if (strcmp(x->format, "twopass.ff") == 0)
+		return ff_file_open(r->file, NULL, NULL, &x->ff, e);
+	if (strcmp(x->format, "twopass.rad") == 0)
+		return rad_file_read(r->file, &x->model, &x->solution, &x->info, e);
+	return mesh_file_read(r->file, &x->model, &x->info, e);
+}
+
+static int need_kind(const struct request *r, const struct content *x, const char *option,
+                     int form_factors, struct err *e)
+{
+	if (form_factors == (strcmp(x->format, "twopass.ff") == 0))
+		return 0;
+	return err_set(e, "%s: this is a %s file; %s needs %s", r->file, x->format, option,
+	               form_factors ? "form factors (.ff)" : "a .mesh or .rad file");
+}
+
+/* ---- overview ---- */
+
+static int is_digest(const char *key)
+{
+	return strncmp(key, "digest.", 7) == 0;
+}
+
+/* Metadata that holds JSON text as JSON, else as a string. */
+static json_t *meta_value(const char *value)
+{
+	json_t *nested = *value == '{' || *value == '[' ? json_loads(value, 0, NULL) : NULL;
+
+	return nested ? nested : json_string(value);
+}
+
+/* JSON has no infinity and no NaN. */
+static json_t *json_number(double x)
+{
+	return isfinite(x) ? json_real(x) : json_string(isnan(x) ? "nan" : x > 0 ? "inf" : "-inf");
+}
+
+static json_t *json_array_entry(const struct container_view *v)
+{
+	struct array_stats s;
+	json_t *shape = json_array();
+
+	array_stats(v, &s);
+	for (int d = 0; d < v->dims; d++)
+		json_array_append_new(shape, json_integer((json_int_t)v->shape[d]));
+	return json_pack("{s:s, s:s, s:o, s:o, s:o, s:o, s:I}", "name", v->name, "dtype",
+	                 dtype_name(v->type), "shape", shape, "min", json_number(s.min), "mean",
+	                 json_number(s.mean), "max", json_number(s.max), "nans",
+	                 (json_int_t)s.nans);
+}
+
+static json_t *json_overview(const struct container *c)
+{
+	json_t *meta = json_object(), *arrays = json_array();
+
+	for (size_t i = 0; i < container_metas(c); i++) {
+		const char *value, *key = container_meta_at(c, i, &value);
+		if (!is_digest(key))
+			json_object_set_new(meta, key, meta_value(value));
+	}
+	for (size_t i = 0; i < container_arrays(c); i++)
+		json_array_append_new(arrays, json_array_entry(container_at(c, i)));
+	return json_pack("{s:s, s:o, s:o}", "file", container_path(c), "metadata", meta, "arrays",
+	                 arrays);
+}
+
+static int print_json(json_t *j)
+{
+	int failed = json_dumpf(j, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(17));
+
+	json_decref(j);
+	putchar('\n');
+	return failed;
+}
+
+/* Indented under its key: each command of the history, or a value's JSON lines. */
+static void print_block(const char *key, const char *text)
+{
+	printf("%s\n", key);
+	while (*text) {
+		int n = (int)strcspn(text, "\n");
+		printf("    %.*s\n", n, text);
+		text += n + (text[n] == '\n');
+	}
+}
+
+static void print_meta(const char *key, const char *value)
+{
+	json_t *j = meta_value(value);
+	char *lines = json_is_string(j) ? NULL : json_dumps(j, JSON_INDENT(2) |
+	                                                   JSON_REAL_PRECISION(17));
+
+	if (json_is_array(j))
+		printf("%-12s %zu: %.60s%s\n", key, json_array_size(j), value,
+		       strlen(value) > 60 ? " ..." : "");
+	else if (lines || strcmp(key, "history") == 0)
+		print_block(key, lines ? lines : value);
+	else
+		printf("%-12s %s\n", key, value);
+	free(lines);
+	json_decref(j);
+}
+
+static void print_array(const struct container_view *v)
+{
+	char shape[96] = "";
+	size_t n = 0;
+	struct array_stats s;
+
+	for (int d = 0; d < v->dims; d++)
+		n += (size_t)snprintf(shape + n, sizeof shape - n, "%s%" PRIu64, d ? "," : "[",
+		                      v->shape[d]);
+	snprintf(shape + n, sizeof shape - n, "%s", v->dims ? "]" : "[]");
+	array_stats(v, &s);
+	printf("%-28s %-3s %-16s %-24.17g %-24.17g %.17g\n", v->name, dtype_name(v->type), shape,
+	       s.min, s.mean, s.max);
+}
+
+static void print_overview(const struct container *c)
+{
+	for (size_t i = 0; i < container_metas(c); i++) {
+		const char *value, *key = container_meta_at(c, i, &value);
+		if (!is_digest(key))
+			print_meta(key, value);
+	}
+	printf("\n%-28s %-3s %-16s %-24s %-24s %s\n", "array", "", "shape", "min", "mean", "max");
+	for (size_t i = 0; i < container_arrays(c); i++)
+		print_array(container_at(c, i));
+}
+
+/* ---- verify ---- */
+
+static int run_checks(const struct request *r, struct content *x, struct verify *v,
+                      struct err *e)
+{
+	*v = (struct verify){ 0 };
+	if (read_content(r, x, e))
+		return -1;
+	if (x->ff.container)
+		return verify_ff(&x->ff.f, &x->ff.scene, v, e);
+	if (x->solution.direct)
+		verify_solution(&x->model, &x->solution, v);
+	return 0;
+}
+
+static json_t *json_checks(const struct verify *v)
+{
+	json_t *list = json_array();
+
+	for (size_t i = 0; i < v->n; i++)
+		json_array_append_new(list, json_pack("{s:s, s:s, s:o, s:o, s:b}", "name",
+		                                      v->item[i].name, "unit", v->item[i].unit,
+		                                      "value", json_number(v->item[i].value),
+		                                      "limit", json_number(v->item[i].limit),
+		                                      "good", verify_good(&v->item[i])));
+	return list;
+}
+
+static void print_checks(const struct container *c, const struct verify *v)
+{
+	printf("digests, structure, ranges: good, %zu arrays\n", container_arrays(c));
+	for (size_t i = 0; i < v->n; i++) {
+		const struct verify_item *item = &v->item[i];
+		printf("%s: %.17g%s%s", item->name, item->value, *item->unit ? " " : "",
+		       item->unit);
+		if (isfinite(item->limit))
+			printf(" (at most %.3g): %s", item->limit,
+			       verify_good(item) ? "good" : "BAD");
+		putchar('\n');
+	}
+}
+
+static int verify(const struct request *r, struct content *x, struct err *e)
+{
+	struct verify v;
+
+	if (run_checks(r, x, &v, e))
+		return -1;
+	if (r->json) {
+		json_t *j = json_overview(x->container);
+		json_object_set_new(j, "verify", json_checks(&v));
+		print_json(j);
+	} else {
+		print_checks(x->container, &v);
+	}
+	for (size_t i = 0; i < v.n; i++)
+		if (!verify_good(&v.item[i]))
+			return err_set(e, "%s: %s: %.3g %s is more than %.3g; compute it again, with "
+			               "more samples if it is sampled", r->file, v.item[i].name,
+			               v.item[i].value, v.item[i].unit, v.item[i].limit);
+	return 0;
+}
+
+/* ---- CSV ---- */
+
+/* A field as RFC 4180 has it, with what follows it. */
+static void csv_text(const char *text, const char *after)
+{
+	if (!text[strcspn(text, ",\"\n\r")]) {
+		printf("%s%s", text, after);
+		return;
+	}
+	putchar('"');
+	for (; *text; text++)
+		printf(*text == '"' ? "\"%c" : "%c", *text);
+	printf("\"%s", after);
+}
+
+static void csv_header(const struct model *m, int solved)
+{
+	printf("element,side,patch,name,material,area,cx,cy,cz,nx,ny,nz");
+	for (int q = solved ? 0 : 2; q < 3; q++)
+		for (int b = 0; b < m->bands; b++)
+			printf(",%c_%d", "HME"[q], b);
+	putchar('\n');
+}
+
+static void csv_line(const struct content *x, size_t element_side, int solved)
+{
+	const struct model *m = &x->model;
+	struct side_row row;
+
+	side_row(m, solved ? &x->solution : NULL, element_side, &row);
+	printf("%" PRIu32 ",%c,%" PRIu32 ",", row.element, "fb"[row.side], row.patch);
+	csv_text(m->surface.name[row.surface], ",");
+	csv_text(m->material.name[row.material], "");
+	printf(",%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g", row.area, row.centre[0],
+	       row.centre[1], row.centre[2], row.normal[0], row.normal[1], row.normal[2]);
+	const double *quantity[] = { row.h, row.m, row.e };
+	for (int q = solved ? 0 : 2; q < 3; q++)
+		for (int b = 0; b < m->bands; b++)
+			printf(",%.17g", quantity[q][b]);
+	putchar('\n');
+}
+
+static int is_modelled(const struct model *m, size_t element_side)
+{
+	return model_side_modelled(m, 2 * m->element_patch[element_side >> 1] +
+	                                  (uint32_t)(element_side & 1));
+}
+
+static int print_sides(const struct request *r, struct content *x, struct err *e)
+{
+	if (need_kind(r, x, r->csv ? "--csv" : "--row", 0, e) || read_content(r, x, e))
+		return -1;
+	const struct model *m = &x->model;
+	size_t begin = r->csv ? 0 : (size_t)r->row, end = r->csv ? 2 * m->elements : begin + 1;
+	int solved = x->solution.direct != NULL;
+	if (end > 2 * m->elements)
+		return err_set(e, "%s: there is no element-side %zu; the last is %zu", r->file, begin,
+		               2 * m->elements - 1);
+	if (!r->csv && !is_modelled(m, begin))
+		return err_set(e, "%s: element-side %zu is not modelled; it is the black back of a "
+		               "one-sided surface", r->file, begin);
+	csv_header(m, solved);
+	for (size_t i = begin; i < end; i++)
+		if (is_modelled(m, i))
+			csv_line(x, i, solved);
+	return 0;
+}
+
+/* ---- form factors ---- */
+
+static void print_matrix_line(double *row, const struct patch_matrix *pm, double black,
+                              double escape)
+{
+	for (size_t k = 0; k < pm->sides; k++)
+		printf(",%.17g", row[k]);
+	if (pm->unmodelled)
+		printf(",%.17g", black);
+	printf(",%.17g\n", escape);
+}
+
+/* Sides without a row (black ones, other parts) have a column but no line. */
+static int csv_matrix(const struct ff_file *ff, const struct patch_matrix *pm, struct err *e)
+{
+	char **name = ff_file_side_names(ff, e);
+	double black, escape, *row = mem_new(pm->sides, sizeof *row, "a row", e);
+	int failed = !name || !row;
+
+	printf("%s", failed ? "" : "from,");
+	for (size_t k = 0; k < pm->sides && !failed; k++)
+		csv_text(name[pm->side[k]], ",");
+	if (!failed)
+		printf("%sescape\n", pm->unmodelled ? "unmodelled," : "");
+	for (size_t i = 0; i < pm->sides && !failed; i++) {
+		if (pm->row[i] == FF_NO_ROW)
+			continue;
+		patch_matrix_row(pm, i, row, &black, &escape);
+		csv_text(name[pm->side[i]], "");
+		print_matrix_line(row, pm, black, escape);
+	}
+	free(row);
+	cache_names_free(name, 2 * ff->scene.patches);
+	return failed ? -1 : 0;
+}
+
+/* The columns of the CSV and a row for each of them, NaN where it has no line. */
+static int npy_matrix(const struct patch_matrix *pm, const char *path, struct err *e)
+{
+	const size_t columns = pm->sides + 1 + (size_t)pm->unmodelled;
+	const uint64_t shape[] = { pm->sides, columns };
+	struct atomic_file *f = atomic_file_create(path, e);
+	double black, *row = mem_new(columns, sizeof *row, "a row", e);
+	int failed = !f || !row || npy_begin(f, DT_F64, 2, shape, e);
+
+	for (size_t i = 0; i < pm->sides && !failed; i++) {
+		patch_matrix_row(pm, i, row, &black, &row[columns - 1]);
+		if (pm->unmodelled)
+			row[columns - 2] = black;
+		failed = atomic_file_write(f, row, columns * sizeof *row, e);
+	}
+	free(row);
+	if (!failed)
+		return atomic_file_finish(f, e);
+	atomic_file_abandon(f);
+	return -1;
+}
+
+static int patch_matrix(const struct request *r, struct content *x, struct err *e)
+{
+	struct patch_matrix pm = { 0 };
+
+	if (need_kind(r, x, "--" PATCH_MATRIX, 1, e) || read_content(r, x, e) ||
+	    patch_matrix_init(&pm, &x->ff.f, &x->ff.scene, e))
+		return -1;
+	int failed = r->npy ? npy_matrix(&pm, r->output ? r->output : "-", e)
+	                    : csv_matrix(&x->ff, &pm, e);
+	patch_matrix_free(&pm);
+	return failed;
+}
+
+static void print_block_lines(const struct ff_file *ff, char *const *name, uint32_t row,
+                              uint64_t b)
+{
+	const struct ff *f = &ff->f;
+	const struct {
+		const char *where;
+		double value;
+	} rest[] = { { "escape", f->block_escape[b] }, { "black", f->block_black[b] },
+	             { "lost", f->block_lost[b] }, { "cut", f->block_cut[b] } };
+	uint32_t patch = 0;
+
+	for (uint64_t k = f->block_start[b]; k < f->block_start[b + 1]; k++) {
+		uint32_t element = f->column[k] >> 1;
+		if (element < ff->scene.patch_start[patch])
+			patch = 0; /* the back's entries of a patch follow the front's */
+		while (element >= ff->scene.patch_start[patch + 1])
+			patch++;
+		printf("%" PRIu32 ",", f->block_chain[b]);
+		csv_text(name[2 * (size_t)patch + (f->column[k] & 1)], "");
+		printf(",%" PRIu32 ",%.17g\n", element, f->row_scale[row] * ff_value(f, k));
+	}
+	for (size_t i = 0; i < sizeof rest / sizeof *rest; i++)
+		if (rest[i].value > 0)
+			printf("%" PRIu32 ",%s,,%.17g\n", f->block_chain[b], rest[i].where,
+			       f->row_scale[row] * rest[i].value);
+}
+
+static int print_row(const struct request *r, struct content *x, struct err *e)
+{
+	static const char *const kind[] = { "diffuse", "emission", "reflected", "transmitted" };
+	const struct ff *f = &x->ff.f;
+	const uint32_t row = (uint32_t)r->row;
+
+	if (read_content(r, x, e))
+		return -1;
+	if (row >= f->rows)
+		return err_set(e, "%s: there is no row %" PRIu32 "; the file has %zu", r->file, row,
+		               f->rows);
+	char **name = ff_file_side_names(&x->ff, e);
+	if (!name)
+		return -1;
+	printf("row       %" PRIu32 "\nfrom      %s\nkind      %s\nsamples   %" PRIu32
+	       "\nscale     %.17g\nresidual  %.17g\nerror     %.17g\n\n", row,
+	       name[f->row_side[row]], kind[f->row_kind[row]], f->row_samples[row],
+	       f->row_scale[row], f->row_residual[row], f->row_error[row]);
+	printf("chain,to,element,value\n");
+	for (uint64_t b = f->row_block[row]; b < f->row_block[row + 1]; b++)
+		print_block_lines(&x->ff, name, row, b);
+	cache_names_free(name, 2 * x->ff.scene.patches);
+	return 0;
+}
+
+/* ---- */
+
+static int write_npy(const struct request *r, const struct content *x, struct err *e)
+{
+	const struct container_view *v = container_find(x->container, r->npy);
+
+	if (!v)
+		return err_set(e, "%s: there is no array %s; inspect %s lists them", r->file, r->npy,
+		               r->file);
+	return container_verify(x->container, v, e) ||
+	       npy_write(r->output ? r->output : "-", v, e) ? -1 : 0;
+}
+
+static int inspect(const struct request *r, struct content *x, struct err *e)
+{
+	int matrix = r->matrix || (r->npy && strcmp(r->npy, PATCH_MATRIX) == 0);
+
+	if (!(x->container = container_open(r->file, NULL, e)))
+		return -1;
+	x->format = container_get_meta(x->container, "format");
+	if (r->verify)
+		return verify(r, x, e);
+	if (matrix)
+		return patch_matrix(r, x, e);
+	if (r->npy)
+		return write_npy(r, x, e);
+	if (r->row >= 0 && strcmp(x->format, "twopass.ff") == 0)
+		return print_row(r, x, e);
+	if (r->csv || r->row >= 0)
+		return print_sides(r, x, e);
+	if (r->json)
+		print_json(json_overview(x->container));
+	else
+		print_overview(x->container);
+	return 0;
+}
+
+int main(int argc, char **argv)
+{
+	struct cli c = { .program = "inspect", .synopsis = "[options] FILE",
+		.about = "Shows what is in a .mesh, .ff or .rad file, and whether it is right.",
+		.options = options };
+	struct request r;
+	struct content x = { 0 };
+	struct err e = { 0 };
+
+	cli_signals();
+	parse(&c, argc, argv, &r);
+	if (r.npy && (!r.output || strcmp(r.output, "-") == 0) && isatty(STDOUT_FILENO))
+		cli_usage(&c, "--npy is binary; redirect it or give --output");
+	int failed = inspect(&r, &x, &e);
+	content_free(&x);
+	return cli_finish(&c, failed ? cli_fail(&c, &e) : 0);
+}
