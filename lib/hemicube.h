@@ -38,12 +38,10 @@ void hemi_grid_free(struct hemi_grid *g);
  * frame) falls into. Directions below the horizon give its lowest row. O(1). */
 size_t hemicube_lookup(const struct hemi_grid *g, const double direction[3]);
 
-/* All elements of a model, arranged for drawing. Elements are drawn, not the input
- * triangles they came from: to find the elements of the pixels afterwards costs
- * more than to draw up to some 100 000 of them. */
+/* All elements of a model, arranged for drawing. */
 struct hemi_scene;
 
-/* O(elements log elements). m may be freed before it. NULL and e on failure. */
+/* O(elements log elements). m must outlive it. NULL and e on failure. */
 struct hemi_scene *hemi_scene_new(const struct model *m, struct err *e);
 void hemi_scene_free(struct hemi_scene *s);
 
@@ -64,11 +62,13 @@ void hemicube_free(struct hemicube *h);
 /* Draws all elements but `own` (HEMI_VOID: all) as seen from eye into item and
  * depth. frame = { t, b, n }, orthonormal. Elements are seen from both sides;
  * the side recorded is the one that faces the eye. A pixel shows what its centre
- * sees; of equal depths the lowest element-side wins. Nothing in the horizon
- * plane is seen, and there is no near plane: whatever stands above the horizon
- * plane by more than the rounding of world coordinates blocks.
- * O(elements + pixels), with groups of elements below the horizon or behind what
- * is nearer passed over; no allocation. */
+ * sees; of equal depths the lowest number wins. Nothing in the horizon plane is
+ * seen, and there is no near plane: whatever stands above the horizon plane by more
+ * than the rounding of world coordinates blocks.
+ * Where elements are many more than input triangles, and more than the pixels are
+ * worth, the triangles are drawn (without own's) and each pixel's element is found
+ * in them. O(elements + pixels), or O(triangles + pixels log elements); what is
+ * below the horizon or behind nearer things is passed over. No allocation. */
 void hemicube_render(struct hemicube *h, const struct hemi_scene *s, const double eye[3],
                      const double frame[3][3], uint32_t own);
 

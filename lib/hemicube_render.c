@@ -26,7 +26,7 @@ static const struct face {
 	{ 0, 2, 1, -1, 1 }, { 0, 2, 1, 1, -1 } };
 
 /* Cluster vertices into the cube's frame. */
-static void transform(const struct hemi_scene *s, const struct hemi_cluster *c,
+static void transform(const struct hemi_mesh *s, const struct hemi_cluster *c,
                       const double eye[3], const double frame[3][3], struct hemi_work *w)
 {
 	for (int i = 0; i < c->vertices; i += 4) {
@@ -114,7 +114,7 @@ static void draw_element(const struct hemi_target *t, const struct face *f,
 }
 
 static void draw_cluster(const struct hemi_target *t, const struct face *f,
-                         const struct hemi_scene *s, const struct hemi_cluster *c,
+                         const struct hemi_mesh *s, const struct hemi_cluster *c,
                          const struct hemi_work *w, int coded, uint32_t own)
 {
 	for (size_t n = c->triangle; n < c->triangle + (size_t)c->triangles; n++) {
@@ -123,10 +123,10 @@ static void draw_cluster(const struct hemi_target *t, const struct face *f,
 		if (coded) {
 			int all = w->code[i[0]] & w->code[i[1]] & w->code[i[2]];
 			int any = w->code[i[0]] | w->code[i[1]] | w->code[i[2]];
-			if (all || s->element[n] == own)
+			if (all || s->number[n] == own)
 				continue;
 			if (any & OUT_PYRAMID) {
-				draw_element(t, f, w, i, s->element[n], 1);
+				draw_element(t, f, w, i, s->number[n], 1);
 				continue;
 			}
 		}
@@ -136,8 +136,8 @@ static void draw_cluster(const struct hemi_target *t, const struct face *f,
 		int low = min_i(w->row[i[0]], min_i(w->row[i[1]], w->row[i[2]]));
 		int high = max_i(w->row[i[0]], max_i(w->row[i[1]], w->row[i[2]]));
 		if (max_i(left, 0) < min_i(right, t->columns) &&
-		    max_i(low, 0) < min_i(high, t->rows) && s->element[n] != own)
-			draw_element(t, f, w, i, s->element[n], 0);
+		    max_i(low, 0) < min_i(high, t->rows) && s->number[n] != own)
+			draw_element(t, f, w, i, s->number[n], 0);
 	}
 }
 
@@ -222,7 +222,7 @@ static struct hemi_target target_face(const struct hemicube *h, int face)
 
 /* What one call of hemicube_render draws. */
 struct drawing {
-	const struct hemi_scene *s;
+	const struct hemi_mesh *s;
 	const double *eye;
 	const double (*frame)[3];
 	uint32_t own;
@@ -256,8 +256,8 @@ static void render_cluster(const struct drawing *g, struct hemi_work *w,
 	}
 }
 
-void hemicube_render(struct hemicube *h, const struct hemi_scene *s, const double eye[3],
-                     const double frame[3][3], uint32_t own)
+static void draw_mesh(struct hemicube *h, const struct hemi_mesh *s, const double eye[3],
+                      const double frame[3][3], uint32_t own)
 {
 	struct drawing g = { .s = s, .eye = eye, .frame = frame, .own = own };
 	size_t tiles = hemi_tiles(h->grid->n) * (hemi_tiles(h->grid->n) +
@@ -290,4 +290,51 @@ void hemicube_render(struct hemicube *h, const struct hemi_scene *s, const doubl
 			h->work->drawn = 0;
 		}
 	}
+}
+
+/* Turns input triangles into elements. The weight of a corner along direction d is
+ * proportional to d.(q x r), q and r the other corners as seen from the eye. */
+static void find_elements(struct hemicube *h, const struct model *m, const double eye[3],
+                          const double frame[3][3])
+{
+	uint32_t known = HEMI_VOID;
+	double side[3][3]; /* the three products of triangle `known`, cube's frame */
+
+	for (size_t i = 0; i < h->grid->pixels; i++) {
+		uint32_t item = h->item[i];
+		if (item == HEMI_VOID)
+			continue;
+		if (item >> 1 != known) {
+			known = item >> 1;
+			double v[3][3], d[3];
+			for (int k = 0; k < 3; k++) {
+				v3_sub(&m->vertex[3 * (size_t)m->triangle[3 * (size_t)known + (size_t)k]],
+				       eye, d);
+				for (int c = 0; c < 3; c++)
+					v[k][c] = v3_dot(frame[c], d);
+			}
+			for (int k = 0; k < 3; k++)
+				v3_cross(v[(k + 1) % 3], v[(k + 2) % 3], side[k]);
+		}
+		const double *d = &h->grid->direction[3 * i];
+		double w[3] = { v3_dot(side[0], d), v3_dot(side[1], d), v3_dot(side[2], d) };
+		double sum = w[0] + w[1] + w[2];
+		for (int k = 0; k < 3; k++)
+			w[k] /= sum;
+		h->item[i] = 2 * model_locate(m, known, w) + (item & 1);
+	}
+}
+
+void hemicube_render(struct hemicube *h, const struct hemi_scene *s, const double eye[3],
+                     const double frame[3][3], uint32_t own)
+{
+	const struct hemi_mesh *t = &s->triangles;
+
+	/* To find a pixel's element takes about as long as to draw two. */
+	if (!t->triangles || s->elements.triangles - t->triangles <= 2 * h->grid->pixels) {
+		draw_mesh(h, &s->elements, eye, frame, own);
+		return;
+	}
+	draw_mesh(h, t, eye, frame, own == HEMI_VOID ? own : s->m->element_triangle[own]);
+	find_elements(h, s->m, eye, frame);
 }

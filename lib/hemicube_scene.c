@@ -11,9 +11,10 @@
 /* What is needed while clusters are formed. */
 struct builder {
 	const struct model *m;
-	struct hemi_scene *s;
-	double *centroid;      /* [elements][3] */
-	uint32_t *order;       /* elements, permuted */
+	struct hemi_mesh *s;
+	const uint32_t *corner; /* [triangles][3] the model's vertices */
+	double *centroid;      /* [triangles][3] */
+	uint32_t *order;       /* triangles, permuted */
 	uint32_t *local;       /* [vertices] number within the cluster it was last in */
 	uint32_t *stamp;       /* [vertices] 1 + that cluster */
 	size_t vertices;       /* emitted so far */
@@ -27,7 +28,7 @@ static void exchange(uint32_t *a, uint32_t *b)
 	*b = t;
 }
 
-/* 1 if element a comes before b along the axis. */
+/* 1 if triangle e comes before f along the axis. */
 static int before(const struct builder *b, int axis, uint32_t e, uint32_t f)
 {
 	double x = b->centroid[3 * (size_t)e + (size_t)axis];
@@ -82,7 +83,7 @@ static void bounds(const struct builder *b, size_t begin, size_t end, double lo[
 /* Number of a model's vertex within cluster c, adding it if it is new. */
 static uint32_t local_vertex(struct builder *b, struct hemi_cluster *c, uint32_t v)
 {
-	struct hemi_scene *s = b->s;
+	struct hemi_mesh *s = b->s;
 	uint32_t mark = (uint32_t)(s->clusters + 1);
 
 	if (b->stamp[v] == mark)
@@ -95,7 +96,7 @@ static uint32_t local_vertex(struct builder *b, struct hemi_cluster *c, uint32_t
 	return b->local[v] = (uint32_t)c->vertices++;
 }
 
-static void bounding_sphere(const struct hemi_scene *s, struct hemi_cluster *c)
+static void bounding_sphere(const struct hemi_mesh *s, struct hemi_cluster *c)
 {
 	const double *x[3] = { s->x + c->vertex, s->y + c->vertex, s->z + c->vertex };
 	double far = 0;
@@ -119,15 +120,15 @@ static void bounding_sphere(const struct hemi_scene *s, struct hemi_cluster *c)
 
 static int32_t emit_cluster(struct builder *b, size_t begin, size_t end)
 {
-	struct hemi_scene *s = b->s;
+	struct hemi_mesh *s = b->s;
 	struct hemi_cluster *c = &s->cluster[s->clusters];
 
 	*c = (struct hemi_cluster){ .vertex = b->vertices, .triangle = begin };
 	for (size_t i = begin; i < end; i++) {
-		const uint32_t *v = &b->m->element[3 * (size_t)b->order[i]];
+		const uint32_t *v = &b->corner[3 * (size_t)b->order[i]];
 		for (int k = 0; k < 3; k++)
 			s->corner[i][k] = (uint8_t)local_vertex(b, c, v[k]);
-		s->element[i] = b->order[i];
+		s->number[i] = b->order[i];
 	}
 	c->triangles = (int)(end - begin);
 	bounding_sphere(s, c);
@@ -170,8 +171,8 @@ static void prepare(struct builder *b)
 	for (size_t i = 0; i < 3 * m->vertices; i++)
 		largest = fmax(largest, fabs(m->vertex[i]));
 	b->s->horizon = 64 * DBL_EPSILON * largest;
-	for (size_t i = 0; i < m->elements; i++) {
-		const uint32_t *c = &m->element[3 * i];
+	for (size_t i = 0; i < b->s->triangles; i++) {
+		const uint32_t *c = &b->corner[3 * i];
 		b->order[i] = (uint32_t)i;
 		for (size_t k = 0; k < 3; k++)
 			b->centroid[3 * i + k] = (m->vertex[3 * (size_t)c[0] + k] +
@@ -183,25 +184,26 @@ static void prepare(struct builder *b)
 static int allocate(struct builder *b, struct err *e)
 {
 	const struct model *m = b->m;
-	struct hemi_scene *s = b->s;
+	struct hemi_mesh *s = b->s;
+	size_t n = s->triangles;
 	/* Halving leaves more than CLUSTER_TRIANGLES / 2 in each. */
-	size_t clusters = m->elements / (CLUSTER_TRIANGLES / 2) + 1;
+	size_t clusters = n / (CLUSTER_TRIANGLES / 2) + 1;
 
-	if (m->elements > HEMI_VOID / 2)
-		return err_set(e, "too many elements for a hemicube: %zu", m->elements);
-	size_t vertices = 3 * (m->elements + clusters);
+	if (n > HEMI_VOID / 2)
+		return err_set(e, "too many elements for a hemicube: %zu", n);
+	size_t vertices = 3 * (n + clusters);
 	s->cluster = mem_new(clusters, sizeof *s->cluster, "hemicube clusters", e);
 	s->split = mem_new(clusters, sizeof *s->split, "hemicube clusters", e);
 	s->x = mem_new(vertices, sizeof *s->x, "hemicube vertices", e);
 	s->y = mem_new(vertices, sizeof *s->y, "hemicube vertices", e);
 	s->z = mem_new(vertices, sizeof *s->z, "hemicube vertices", e);
-	s->corner = mem_new(m->elements, sizeof *s->corner, "hemicube elements", e);
-	s->element = mem_new(m->elements, sizeof *s->element, "hemicube elements", e);
-	b->centroid = mem_new(m->elements, 3 * sizeof *b->centroid, "centroids", e);
-	b->order = mem_new(m->elements, sizeof *b->order, "element order", e);
+	s->corner = mem_new(n, sizeof *s->corner, "hemicube triangles", e);
+	s->number = mem_new(n, sizeof *s->number, "hemicube triangles", e);
+	b->centroid = mem_new(n, 3 * sizeof *b->centroid, "centroids", e);
+	b->order = mem_new(n, sizeof *b->order, "triangle order", e);
 	b->local = mem_new(m->vertices, sizeof *b->local, "vertex numbers", e);
 	b->stamp = mem_new(m->vertices, sizeof *b->stamp, "vertex stamps", e);
-	return s->cluster && s->split && s->x && s->y && s->z && s->corner && s->element &&
+	return s->cluster && s->split && s->x && s->y && s->z && s->corner && s->number &&
 	       b->centroid && b->order && b->local && b->stamp ? 0 : -1;
 }
 
@@ -214,40 +216,63 @@ static void shrink(double **a, size_t n)
 		*a = p;
 }
 
-struct hemi_scene *hemi_scene_new(const struct model *m, struct err *e)
+int hemi_mesh_init(struct hemi_mesh *s, const struct model *m, const uint32_t *corner, size_t n,
+                   struct err *e)
 {
-	struct builder b = { .m = m, .s = mem_new(1, sizeof *b.s, "hemicube scene", e) };
+	struct builder b = { .m = m, .s = s, .corner = corner };
+	int bad;
 
-	if (!b.s)
-		return NULL;
-	if (allocate(&b, e)) {
-		hemi_scene_free(b.s);
-		b.s = NULL;
-	} else {
+	*s = (struct hemi_mesh){ .triangles = n };
+	bad = allocate(&b, e);
+	if (!bad) {
 		prepare(&b);
-		if (m->elements)
-			b.s->root = divide(&b, 0, m->elements);
-		shrink(&b.s->x, b.vertices);
-		shrink(&b.s->y, b.vertices);
-		shrink(&b.s->z, b.vertices);
+		if (n)
+			s->root = divide(&b, 0, n);
+		shrink(&s->x, b.vertices);
+		shrink(&s->y, b.vertices);
+		shrink(&s->z, b.vertices);
 	}
 	free(b.centroid);
 	free(b.order);
 	free(b.local);
 	free(b.stamp);
-	return b.s;
+	return bad;
 }
 
-void hemi_scene_free(struct hemi_scene *s)
+void hemi_mesh_free(struct hemi_mesh *s)
 {
-	if (!s)
-		return;
 	free(s->cluster);
 	free(s->split);
 	free(s->x);
 	free(s->y);
 	free(s->z);
 	free(s->corner);
-	free(s->element);
+	free(s->number);
+	*s = (struct hemi_mesh){ 0 };
+}
+
+struct hemi_scene *hemi_scene_new(const struct model *m, struct err *e)
+{
+	struct hemi_scene *s = mem_new(1, sizeof *s, "hemicube scene", e);
+
+	if (!s)
+		return NULL;
+	s->m = m;
+	/* Hardly subdivided: the elements are as good as the triangles. */
+	size_t n = m->triangles > m->elements / 2 ? 0 : m->triangles;
+	if (hemi_mesh_init(&s->elements, m, m->element, m->elements, e) ||
+	    hemi_mesh_init(&s->triangles, m, m->triangle, n, e)) {
+		hemi_scene_free(s);
+		return NULL;
+	}
+	return s;
+}
+
+void hemi_scene_free(struct hemi_scene *s)
+{
+	if (!s)
+		return;
+	hemi_mesh_free(&s->elements);
+	hemi_mesh_free(&s->triangles);
 	free(s);
 }

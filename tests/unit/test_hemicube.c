@@ -415,6 +415,85 @@ static void aligned_grid(void **state)
 	model_free(&m);
 }
 
+/* Splits a triangle (corners v) at the middle of its longest edge, `depth` times;
+ * what triangle_split holds. */
+static int32_t bisect(struct model *m, uint32_t triangle, const uint32_t v[3], int depth)
+{
+	double longest = -1, middle[3];
+	int edge = 0;
+
+	if (depth == 0) {
+		m->element_triangle[m->elements] = triangle;
+		add_triangle(m, v[0], v[1], v[2]);
+		return ~(int32_t)(m->elements - 1);
+	}
+	for (int k = 0; k < 3; k++) {
+		double d[3];
+		v3_sub(&m->vertex[3 * v[k]], &m->vertex[3 * v[(k + 1) % 3]], d);
+		if (v3_length(d) > longest + 1e-9)
+			longest = v3_length(d), edge = k;
+	}
+	const double *a = &m->vertex[3 * v[edge]], *b = &m->vertex[3 * v[(edge + 1) % 3]];
+	for (int k = 0; k < 3; k++)
+		middle[k] = (a[k] + b[k]) / 2;
+	uint32_t c = add_vertex(m, middle[0], middle[1], middle[2]);
+	uint32_t low[3] = { v[0], v[1], v[2] }, high[3] = { v[0], v[1], v[2] };
+	low[(edge + 1) % 3] = high[edge] = c;
+	int32_t at = (int32_t)m->splits++;
+	m->split[at].edge = edge;
+	m->split[at].child[0] = bisect(m, triangle, low, depth - 1);
+	m->split[at].child[1] = bisect(m, triangle, high, depth - 1);
+	return at;
+}
+
+/* Drawing input triangles and finding elements in them, against drawing elements. */
+static void triangles_give_the_same_elements(void **state)
+{
+	enum { DEPTH = 9, ELEMENTS = 12 << DEPTH };
+	double lo[3] = { -1, -2, .5 };
+	struct model coarse = cube_model(lo, 2), m = model_new(8 + ELEMENTS, ELEMENTS);
+	struct rng r = rng_seed(7, 0);
+	size_t differ = 0, pixels = 0;
+
+	(void)state;
+	m.triangle = coarse.element;
+	m.triangles = 12;
+	m.triangle_split = calloc(12, sizeof *m.triangle_split);
+	m.split = calloc(ELEMENTS, sizeof *m.split);
+	m.element_triangle = calloc(ELEMENTS, sizeof *m.element_triangle);
+	assert_true(m.triangle_split && m.split && m.element_triangle);
+	memcpy(m.vertex, coarse.vertex, 24 * sizeof *m.vertex);
+	m.vertices = 8;
+	for (uint32_t t = 0; t < 12; t++)
+		m.triangle_split[t] = bisect(&m, t, &m.triangle[3 * t], DEPTH);
+	struct model elements_only = m;
+	elements_only.triangles = 0;
+	struct stage s = stage_new(&m, 16), e = stage_new(&elements_only, 16);
+	for (int i = 0; i < 200; i++) {
+		double eye[3], frame[3][3];
+		for (int k = 0; k < 3; k++)
+			eye[k] = lo[k] + 2 * rng_uniform(&r);
+		uint32_t own = i % 2 ? HEMI_VOID : (uint32_t)i * 30;
+		random_frame(&r, frame);
+		draw(&s, eye, frame, own);
+		draw(&e, eye, frame, HEMI_VOID);
+		for (size_t p = 0; p < s.grid.pixels; p++) {
+			uint32_t a = s.cube.item[p], b = e.cube.item[p];
+			assert_int_not_equal(b, HEMI_VOID);
+			if (own != HEMI_VOID && m.element_triangle[b >> 1] == m.element_triangle[own])
+				assert_int_equal(a, HEMI_VOID);
+			else
+				differ += a != b;
+		}
+		pixels += s.grid.pixels;
+	}
+	assert_true(differ * 5000 < pixels);
+	stage_free(&s);
+	stage_free(&e);
+	free(coarse.vertex);
+	model_free(&m);
+}
+
 static void same_picture_every_time(void **state)
 {
 	struct rng r = rng_seed(6, 0);
@@ -461,6 +540,7 @@ int main(void)
 		cmocka_unit_test(equal_depths_give_the_lowest),
 		cmocka_unit_test(soup_agrees_with_rays),
 		cmocka_unit_test(aligned_grid),
+		cmocka_unit_test(triangles_give_the_same_elements),
 		cmocka_unit_test(same_picture_every_time),
 		cmocka_unit_test(empty_scene_escapes),
 	};
