@@ -1,0 +1,162 @@
+/* Patch matrices and the laws that --verify checks. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include <float.h>
+
+#include "../../lib/patch_matrix.h"
+#include "../../lib/side_table.h"
+#include "../../lib/verify.h"
+#include "small_scene.h"
+
+static const uint8_t sides[] = { 3, 1 };
+
+static struct ff_scene scene_of(const struct model *m)
+{
+	return (struct ff_scene){ .patches = m->patches, .elements = m->elements,
+		.materials = m->material.n, .patch_start = m->patch_start,
+		.patch_area = m->patch_area, .patch_sides = sides };
+}
+
+static void near(double got, double want)
+{
+	if (!(fabs(got - want) <= 1e-14))
+		fail_msg("%.17g instead of %.17g", got, want);
+}
+
+static void test_matrix(void **state)
+{
+	struct model m;
+	struct ff f;
+	struct patch_matrix pm;
+	struct err e = { 0 };
+	double row[3], black, escape;
+
+	(void)state;
+	small_model(&m);
+	small_ff(&f);
+	struct ff_scene s = scene_of(&m);
+	assert_int_equal(ff_check(&f, &s, &e), 0);
+	assert_int_equal(patch_matrix_init(&pm, &f, &s, &e), 0);
+	assert_int_equal(pm.sides, 3);
+	assert_int_equal(pm.unmodelled, 1);
+	patch_matrix_row(&pm, 0, row, &black, &escape);
+	near(row[0], 0), near(row[1], .25), near(row[2], .25);
+	near(black, .125), near(escape, .375);
+	patch_matrix_row(&pm, 2, row, &black, &escape); /* a scaled row */
+	near(row[0] + row[1] + row[2] + black + escape, 1);
+	patch_matrix_free(&pm);
+	f.row_kind[1] = FF_REFLECTED;
+	assert_int_equal(patch_matrix_init(&pm, &f, &s, &e), 0);
+	patch_matrix_row(&pm, 1, row, &black, &escape);
+	assert_true(isnan(row[0]) && isnan(escape));
+	patch_matrix_free(&pm);
+	ff_free(&f);
+	model_free(&m);
+}
+
+/* Two plates of areas 1 and 2 that see only each other: F_01 = .5, F_10 = .25. */
+static void exchange(double f01, double f10, double error, struct verify *v)
+{
+	uint32_t start[] = { 0, 1, 2 }, side[] = { 0, 2 }, samples[] = { 1, 1 }, chain[] = { 0, 0 };
+	uint32_t column[] = { 2, 0 };
+	double area[] = { 1, 2 }, scale[] = { 1, 1 }, zero[] = { 0, 0 }, errors[] = { error, error };
+	double value[] = { f01, f10 }, escape[] = { 1 - f01, 1 - f10 };
+	uint64_t row_block[] = { 0, 1, 2 }, block_start[] = { 0, 1, 2 }, arrival[] = { 0, 0, 0 };
+	uint64_t chain_start[] = { 0, 0 };
+	uint8_t kind[] = { FF_DIFFUSE, FF_DIFFUSE }, front[] = { 1, 1 };
+	const struct ff f = { .chains = 1, .chain_start = chain_start, .rows = 2, .row_side = side,
+		.row_kind = kind, .row_samples = samples, .row_scale = scale, .row_residual = zero,
+		.row_error = errors, .row_block = row_block, .blocks = 2, .block_chain = chain,
+		.block_start = block_start, .block_escape = escape, .block_black = zero,
+		.block_lost = zero, .block_cut = zero, .block_arrival = arrival, .entries = 2,
+		.column = column, .value64 = value, .patch_end = 2, .part = 1, .parts = 1 };
+	const struct ff_scene s = { 2, 2, 1, start, area, front };
+	struct err e = { 0 };
+
+	assert_int_equal(ff_check(&f, &s, &e), 0);
+	assert_int_equal(verify_ff(&f, &s, v, &e), 0);
+}
+
+static int all_good(const struct verify *v)
+{
+	for (size_t i = 0; i < v->n; i++)
+		if (!verify_good(&v->item[i]))
+			return 0;
+	return 1;
+}
+
+static void test_reciprocity(void **state)
+{
+	struct verify v;
+
+	(void)state;
+	exchange(.5, .25, 0, &v); /* exact formulas state no error */
+	assert_true(all_good(&v));
+	exchange(.5, .2500001, 0, &v); /* float32 rounding */
+	assert_true(all_good(&v));
+	exchange(.5, .26, 0, &v);
+	assert_false(all_good(&v));
+	exchange(.5, .26, .01, &v); /* within what is stated */
+	assert_true(all_good(&v));
+	exchange(.5, .4, .01, &v);
+	assert_false(all_good(&v));
+	exchange(.5, 0, .01, &v);
+	assert_false(all_good(&v));
+}
+
+static void test_ledger(void **state)
+{
+	struct model m;
+	struct solution s;
+	struct verify v;
+
+	(void)state;
+	small_model(&m);
+	small_solution(&s, &m);
+	verify_solution(&m, &s, &v);
+	assert_true(v.item[0].value <= 4 * DBL_EPSILON);
+	s.ledger[LEDGER_ESCAPED * 3 + 1] += 1e-10;
+	verify_solution(&m, &s, &v);
+	assert_false(verify_good(&v.item[0]));
+	solution_free(&s);
+	model_free(&m);
+}
+
+static void test_side_rows(void **state)
+{
+	struct model m;
+	struct solution s;
+	struct side_row front, back;
+
+	(void)state;
+	small_model(&m);
+	small_solution(&s, &m);
+	side_row(&m, &s, 0, &front);
+	side_row(&m, &s, 1, &back);
+	near(front.area, .25);
+	near(front.centre[0], .5), near(front.centre[1], 1. / 3);
+	near(front.normal[2], 1), near(back.normal[2], -1);
+	assert_false(signbit(back.normal[0]));
+	near(back.h[0], (.5 + .25 + .125) * 3); /* the ramps at row 1, band 0 */
+	near(back.m[0], .5 * back.h[0]);
+	side_row(&m, NULL, 4, &front);
+	near(front.e[0], 100 * 3.14159265358979323846);
+	solution_free(&s);
+	model_free(&m);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_matrix),
+		cmocka_unit_test(test_reciprocity),
+		cmocka_unit_test(test_ledger),
+		cmocka_unit_test(test_side_rows),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
