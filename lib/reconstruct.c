@@ -39,7 +39,6 @@ struct near {
 struct scratch {
 	uint32_t *stamp;          /* [elements] group + 1 that last listed it */
 	struct near *near;
-	double *value;            /* [2 sides][bands] at the vertex */
 };
 
 struct job {
@@ -47,6 +46,9 @@ struct job {
 	const struct solution *s;
 	struct smooth_groups g;
 	double *h;                /* [2 elements][bands] */
+	double *value;            /* [groups][2 sides][bands] at the vertices */
+	double *rest;             /* [2 elements][bands] what their means still miss */
+	double *shift;            /* [groups][2 sides][bands] */
 	struct reconstruction *out;
 	struct scratch *scratch;  /* one a thread */
 };
@@ -244,10 +246,11 @@ static void average(const struct job *j, const struct scratch *s, size_t n, doub
 	}
 }
 
-/* Values at the vertex of a group, into s->value. */
+/* Values at the vertex of a group. */
 static void solve_group(const struct job *j, struct scratch *s, size_t group)
 {
 	size_t channels = 2 * (size_t)j->s->bands, begin = 0;
+	double *value = j->value + group * channels;
 	uint32_t vertex = j->m->element[j->g.corner[j->g.start[group]]];
 	struct fit f = { 0 };
 	double normal[3];
@@ -256,7 +259,7 @@ static void solve_group(const struct job *j, struct scratch *s, size_t group)
 	list_group(j, s, group, &f.n);
 	f.ring1 = f.n;
 	double sum = place(j, s, f.n, vertex, normal);
-	average(j, s, f.n, sum, s->value);
+	average(j, s, f.n, sum, value);
 	if (!facing)
 		return;
 	prepare(s, &f);
@@ -264,7 +267,7 @@ static void solve_group(const struct job *j, struct scratch *s, size_t group)
 		int good = f.variance <= accepted_variance;
 		for (size_t c = 0; c < channels && good; c++) {
 			struct channel t = fit_channel(j, s, &f, c);
-			s->value[c] = clamped(&t);
+			value[c] = clamped(&t);
 		}
 		if (good && !j->s->error)
 			return;
@@ -278,7 +281,7 @@ static void solve_group(const struct job *j, struct scratch *s, size_t group)
 		for (size_t c = 0; c < channels && f.variance <= accepted_variance; c++) {
 			struct channel t = fit_channel(j, s, &f, c);
 			double b = consistency(j, s, &f, &t, c);
-			s->value[c] += b * (clamped(&t) - s->value[c]);
+			value[c] += b * (clamped(&t) - value[c]);
 		}
 		return;
 	}
@@ -286,16 +289,106 @@ static void solve_group(const struct job *j, struct scratch *s, size_t group)
 
 static void solve_groups(void *arg, size_t begin, size_t end, int thread)
 {
-	struct job *j = arg;
+	const struct job *j = arg;
+
+	for (size_t g = begin; g < end; g++)
+		solve_group(j, &j->scratch[thread], g);
+}
+
+/* ---- keeping means ----
+ *
+ * Fits flatten what is curved, and wide ones do so within the noise, but always to
+ * the same side. What the means of elements miss is spread by area-weighted averages,
+ * which keep its sum over a surface, and added: noise cancels in it, bias does not. */
+
+/* Mean over an element of what its corners have. */
+static double corner_mean(const struct job *j, const double *at_groups, size_t element,
+                          size_t channel)
+{
+	size_t channels = 2 * (size_t)j->s->bands;
+	const uint32_t *g = &j->g.group[3 * element];
+
+	return (at_groups[g[0] * channels + channel] + at_groups[g[1] * channels + channel] +
+	        at_groups[g[2] * channels + channel]) / 3;
+}
+
+static void find_rest(void *arg, size_t begin, size_t end, int thread)
+{
+	const struct job *j = arg;
 	size_t channels = 2 * (size_t)j->s->bands;
 
+	(void)thread;
+	for (size_t e = begin; e < end; e++)
+		for (size_t c = 0; c < channels; c++)
+			j->rest[e * channels + c] = j->h[e * channels + c] -
+			                            corner_mean(j, j->value, e, c);
+}
+
+static void spread_to_elements(void *arg, size_t begin, size_t end, int thread)
+{
+	const struct job *j = arg;
+	size_t channels = 2 * (size_t)j->s->bands;
+
+	(void)thread;
+	for (size_t e = begin; e < end; e++)
+		for (size_t c = 0; c < channels; c++)
+			j->rest[e * channels + c] = corner_mean(j, j->shift, e, c);
+}
+
+static void spread_to_groups(void *arg, size_t begin, size_t end, int thread)
+{
+	const struct job *j = arg;
+	size_t channels = 2 * (size_t)j->s->bands;
+
+	(void)thread;
 	for (size_t g = begin; g < end; g++) {
-		struct scratch *s = &j->scratch[thread];
-		solve_group(j, s, g);
-		for (uint32_t i = j->g.start[g]; i < j->g.start[g + 1]; i++)
+		double *shift = j->shift + g * channels, area = 0;
+		memset(shift, 0, channels * sizeof *shift);
+		for (uint32_t i = j->g.start[g]; i < j->g.start[g + 1]; i++) {
+			size_t e = j->g.corner[i] / 3;
+			double a = j->m->element_area[e];
+			area += a;
 			for (size_t c = 0; c < channels; c++)
-				j->out->corner[j->g.corner[i] * channels + c] = (float)s->value[c];
+				shift[c] += a * j->rest[e * channels + c];
+		}
+		for (size_t c = 0; c < channels && area > 0; c++)
+			shift[c] /= area;
 	}
+}
+
+/* Adds the shift, without leaving the range of the elements at the vertex further
+ * than the fit did, and stores. */
+static void store_groups(void *arg, size_t begin, size_t end, int thread)
+{
+	const struct job *j = arg;
+	size_t channels = 2 * (size_t)j->s->bands;
+
+	(void)thread;
+	for (size_t g = begin; g < end; g++)
+		for (size_t c = 0; c < channels; c++) {
+			double value = j->value[g * channels + c], low = value, high = value;
+			for (uint32_t i = j->g.start[g]; i < j->g.start[g + 1]; i++) {
+				low = fmin(low, at(j, j->g.corner[i] / 3, c));
+				high = fmax(high, at(j, j->g.corner[i] / 3, c));
+			}
+			value = fmin(fmax(value + j->shift[g * channels + c], low), high);
+			for (uint32_t i = j->g.start[g]; i < j->g.start[g + 1]; i++)
+				j->out->corner[j->g.corner[i] * channels + c] = (float)value;
+		}
+}
+
+static void run(struct job *j, int threads)
+{
+	enum { CHUNK = 1024, SPREADS = 3 };
+
+	par_for(j->g.groups, CHUNK, threads, solve_groups, j, NULL);
+	par_for(j->m->elements, CHUNK, threads, find_rest, j, NULL);
+	for (int i = 0; i < SPREADS; i++) {
+		if (i > 0)
+			par_for(j->m->elements, CHUNK, threads, spread_to_elements, j, NULL);
+		par_for(j->g.groups, CHUNK, threads, spread_to_groups, j, NULL);
+	}
+	par_for(j->g.groups, CHUNK, threads, store_groups, j, NULL);
 }
 
 static int sum_parts(struct job *j, struct err *e)
@@ -313,6 +406,16 @@ static int sum_parts(struct job *j, struct err *e)
 	return 0;
 }
 
+static int new_values(struct job *j, struct err *e)
+{
+	size_t bytes = 2 * (size_t)j->s->bands * sizeof(double);
+
+	j->value = mem_new(j->g.groups, bytes, "irradiance at vertices", e);
+	j->shift = mem_new(j->g.groups, bytes, "irradiance at vertices", e);
+	j->rest = mem_new(j->m->elements, bytes, "irradiance", e);
+	return j->value && j->shift && j->rest ? 0 : -1;
+}
+
 static int new_scratch(struct job *j, int threads, struct err *e)
 {
 	size_t most = 0;
@@ -325,8 +428,7 @@ static int new_scratch(struct job *j, int threads, struct err *e)
 		struct scratch *s = &j->scratch[t];
 		s->stamp = mem_new(j->m->elements, sizeof *s->stamp, "scratch", e);
 		s->near = mem_new(most + RINGS * NEAR_MAX, sizeof *s->near, "scratch", e);
-		s->value = mem_new(2 * (size_t)j->s->bands, sizeof *s->value, "scratch", e);
-		if (!s->stamp || !s->near || !s->value)
+		if (!s->stamp || !s->near)
 			return -1;
 	}
 	return j->scratch ? 0 : -1;
@@ -337,17 +439,18 @@ static void free_job(struct job *j, int threads)
 	for (int t = 0; t < threads && j->scratch; t++) {
 		free(j->scratch[t].stamp);
 		free(j->scratch[t].near);
-		free(j->scratch[t].value);
 	}
 	free(j->scratch);
 	free(j->h);
+	free(j->value);
+	free(j->rest);
+	free(j->shift);
 	smooth_groups_free(&j->g);
 }
 
 int reconstruct(const struct model *m, const struct solution *s, int threads,
                 struct reconstruction *r, struct err *e)
 {
-	enum { CHUNK = 1024 };
 	struct job j = { .m = m, .s = s, .out = r };
 	int bad = -1;
 
@@ -359,8 +462,8 @@ int reconstruct(const struct model *m, const struct solution *s, int threads,
 		r->corner = mem_new(m->elements * 6 * (size_t)s->bands, sizeof *r->corner,
 		                    "irradiance at corners", e);
 	if (r->corner && !sum_parts(&j, e) && !smooth_groups_new(m, COS_CREASE, &j.g, e) &&
-	    !new_scratch(&j, threads, e)) {
-		par_for(j.g.groups, CHUNK, threads, solve_groups, &j, NULL);
+	    !new_values(&j, e) && !new_scratch(&j, threads, e)) {
+		run(&j, threads);
 		bad = 0;
 	}
 	free_job(&j, threads);

@@ -11,7 +11,8 @@
  * drops below 0; where all of them are 0 it is 0.
  *
  * Where a wider fit agrees with the elements within their standard errors, it
- * replaces the narrow one: noise is smoothed, detail is not. */
+ * replaces the narrow one: noise is smoothed, detail is not. The mean over a surface
+ * stays what it was, but for what the limits above forbid. */
 #ifndef TWOPASS_RECONSTRUCT_H
 #define TWOPASS_RECONSTRUCT_H
 

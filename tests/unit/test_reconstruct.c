@@ -261,6 +261,42 @@ static void test_noise(void **state)
 	model_free(&m);
 }
 
+/* The mean over a surface is kept, curved and noisy as the field may be. */
+static double hill(const double p[3])
+{
+	return 1 + sin(3 * p[0]) * sin(3 * p[1]);
+}
+
+static void test_mean(void **state)
+{
+	enum { N = 16 };
+	struct model m;
+	struct solution s;
+	struct reconstruction r;
+	struct rng g = rng_seed(3, 0);
+	double before = 0, after = 0;
+	(void)state;
+
+	grid_new(&m, 1, N, 1, 1);
+	grid_quad(&m, N, 0, origin, x1, y1);
+	grid_end(&m);
+	grid_solution(&m, 0, &s);
+	fill(&m, &s, hill);
+	for (size_t i = 0; i < 2 * m.elements; i++) {
+		s.indirect[i] += .3 * (rng_uniform(&g) - .5);
+		s.error[i] = .3 / sqrt(12);
+	}
+	run(&m, &s, 1, &r);
+	for (size_t e = 0; e < m.elements; e++) {
+		before += s.indirect[2 * e];
+		after += (corner(&r, e, 0) + corner(&r, e, 1) + corner(&r, e, 2)) / 3;
+	}
+	assert_true(fabs(after / before - 1) < 5e-4);
+	reconstruction_free(&r);
+	grid_solution_free(&s);
+	model_free(&m);
+}
+
 static void test_threads(void **state)
 {
 	enum { N = 40 };
@@ -322,7 +358,8 @@ int main(void)
 		cmocka_unit_test(test_constant), cmocka_unit_test(test_linear),
 		cmocka_unit_test(test_linear_irregular), cmocka_unit_test(test_never_negative),
 		cmocka_unit_test(test_crease), cmocka_unit_test(test_surfaces_and_rooms),
-		cmocka_unit_test(test_noise), cmocka_unit_test(test_threads),
+		cmocka_unit_test(test_noise), cmocka_unit_test(test_mean),
+		cmocka_unit_test(test_threads),
 		cmocka_unit_test(test_fan)
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
