@@ -38,6 +38,18 @@ static int present(const struct materials *mt, const double *coefficient, size_t
 	return 0;
 }
 
+/* 1 if a coefficient is exactly 1 in all bands: chains of mirrors leave out such
+ * events (lib/chain.h). */
+static int perfect(const struct materials *mt, const double *coefficient, size_t m, int side)
+{
+	const double *c = &coefficient[material_at(mt, m, side)];
+
+	for (int b = 0; b < mt->bands; b++)
+		if (c[b] != 1)
+			return 0;
+	return 1;
+}
+
 /* An exponent counts only where its coefficient is there. */
 static void exponent(struct digest *d, int here, double k)
 {
@@ -58,7 +70,10 @@ static void digest_materials(struct digest *d, const struct materials *mt)
 			size_t at = 2 * m + (size_t)side;
 			uint8_t diffuse[2] = { (uint8_t)present(mt, mt->rho_d, m, side),
 			                       (uint8_t)present(mt, mt->tau_d, m, side) };
+			uint8_t colourless[2] = { (uint8_t)perfect(mt, mt->rho_s, m, side),
+			                          (uint8_t)perfect(mt, mt->tau_s, m, side) };
 			digest_bytes(d, diffuse, sizeof diffuse);
+			digest_bytes(d, colourless, sizeof colourless);
 			exponent(d, present(mt, mt->rho_s, m, side), mt->alpha[at]);
 			exponent(d, present(mt, mt->tau_s, m, side), mt->beta[at]);
 			exponent(d, present(mt, mt->emission, m, side),

@@ -23,7 +23,8 @@ void cache_info_free(struct cache_info *i);
 
 /* Fills the three ids from the model. geometry_id covers vertices, triangles,
  * elements, split trees, patches, sides modelled, lobe kind, exponents, emission
- * exponents, which coefficients and emissions are non-zero (in any band), the
+ * exponents, which coefficients and emissions are non-zero (in any band), which
+ * directional coefficients are 1 (in all bands), the
  * assignment of materials to surfaces; not names, coefficients, bands, UVs, NORMALs. */
 void cache_ids(const struct model *m, struct cache_info *i);
 

@@ -8,6 +8,36 @@
 
 static int rehash(struct chains *c, size_t size, struct err *e);
 
+enum { CHAINS_AIM = 1024, MOST_MAX = 64 };
+
+static int changes_no_colour(const struct materials *mt, uint32_t id)
+{
+	const double *coefficient = id & 1 ? mt->tau_s : mt->rho_s;
+	size_t at = material_at(mt, id / 4, (int)(id / 2 % 2));
+
+	for (int k = 0; k < mt->bands; k++)
+		if (coefficient[at + (size_t)k] != 1)
+			return 0;
+	return 1;
+}
+
+static void set_most(struct chains *c, const struct materials *mt)
+{
+	uint32_t coloured = 0, most = 1;
+	double chains;
+
+	for (uint32_t i = 0; i < c->events; i++)
+		coloured += !changes_no_colour(mt, c->event[i]);
+	do {
+		chains = 1;
+		for (uint32_t i = 0; i < coloured; i++)
+			chains *= most + 2;
+		most++;
+	} while (chains <= CHAINS_AIM && most <= MOST_MAX);
+	for (uint32_t i = 0; i < c->events; i++)
+		c->most[i] = changes_no_colour(mt, c->event[i]) ? 1 : most - 1;
+}
+
 int chains_init(struct chains *c, const struct model *m, struct err *e)
 {
 	size_t ids = 4 * m->material.n;
@@ -15,7 +45,8 @@ int chains_init(struct chains *c, const struct model *m, struct err *e)
 	*c = (struct chains){ 0 };
 	c->event = mem_new(ids, sizeof *c->event, "ideal events", e);
 	c->slot = mem_new(ids, sizeof *c->slot, "ideal events", e);
-	if (!c->event || !c->slot)
+	c->most = mem_new(ids, sizeof *c->most, "ideal events", e);
+	if (!c->event || !c->slot || !c->most)
 		return -1;
 	for (size_t id = 0; id < ids; id++) {
 		int ideal = bsdf_has_ideal(&m->material, id / 4, (int)(id / 2 % 2), (int)(id % 2));
@@ -23,6 +54,7 @@ int chains_init(struct chains *c, const struct model *m, struct err *e)
 		if (ideal)
 			c->event[c->events++] = (uint32_t)id;
 	}
+	set_most(c, &m->material);
 	uint32_t *none = mem_new(c->events, sizeof *none, "chains", e);
 	int bad = !none || rehash(c, 64, e) || chains_find(c, none, e) == CHAIN_NONE;
 	free(none);
@@ -33,6 +65,7 @@ void chains_free(struct chains *c)
 {
 	free(c->event);
 	free(c->slot);
+	free(c->most);
 	free(c->count.data);
 	free(c->child.data);
 	free(c->length.data);
@@ -107,6 +140,8 @@ uint32_t chains_child(struct chains *c, uint32_t chain, uint32_t event, struct e
 
 	if (child != CHAIN_NONE)
 		return child;
+	if (chains_count(c, chain)[event] >= c->most[event])
+		return ((uint32_t *)c->child.data)[at] = chain;
 	uint32_t *count = mem_new(c->events, sizeof *count, "chains", e);
 	if (!count)
 		return CHAIN_NONE;
@@ -123,6 +158,8 @@ void chains_tie(struct chains *c)
 	for (uint32_t i = 1; i < c->n; i++) {
 		uint32_t *count = (uint32_t *)c->count.data + (size_t)i * c->events;
 		for (uint32_t k = 0; k < c->events; k++) {
+			if (count[k] >= c->most[k])
+				((uint32_t *)c->child.data)[(size_t)i * c->events + k] = i;
 			if (!count[k])
 				continue;
 			count[k]--; /* the parent's counts, looked up in place */
@@ -149,7 +186,7 @@ uint32_t chains_reverse(struct chains *c, uint32_t chain, struct err *e)
 		if (n && to == CHAIN_NONE)
 			passes = 0;
 		else if (n)
-			count[to] = n;
+			count[to] = n < c->most[to] ? n : c->most[to];
 	}
 	if (passes)
 		found = chains_find(c, count, e);

@@ -1,9 +1,13 @@
-/* Chains of ideal specular events, as multisets.
+/* Chains of ideal specular events, as multisets with saturating counts.
  *
- * Colours multiply, so the order of the events does not matter to the light
- * that comes through: a chain is how often each ideal event was passed. The
- * ideal events of a model are few (one for each material, side and direction
- * with an infinite exponent), the chains can be many. */
+ * Colours multiply, so the order of the events does not matter to the light that
+ * comes through: a chain is how often each ideal event was passed. The ideal events
+ * of a model are few (one for each material, side and direction with an infinite
+ * exponent); so that the chains stay few too, a count stops at a most, where it
+ * means "so often or more": one more such event leads back to the same chain, and
+ * light that goes round there is summed as a geometric series. Events of
+ * coefficient 1 (perfect mirrors) change no colour and count once. Others count
+ * so far that a model has about a thousand chains at the most. */
 #ifndef TWOPASS_CHAIN_H
 #define TWOPASS_CHAIN_H
 
@@ -18,6 +22,7 @@
 struct chains {
 	uint32_t events;        /* ideal events of the model */
 	uint32_t *event;        /* ids, ascending: ff.h */
+	uint32_t *most;         /* [events] where the count stops */
 	uint32_t *slot;         /* [4 materials] event id -> index, or CHAIN_NONE */
 	struct vec count;       /* uint32_t [n][events] */
 	struct vec child;       /* uint32_t [n][events], CHAIN_NONE = not made yet */

@@ -41,7 +41,8 @@ enum ff_row_kind {
 struct ff {
 	/* Chains. Event id = ((2 material + side light arrives on) 2 + T), T = 1
 	 * straight through. Chain c passed events chain_event[i] chain_count[i]
-	 * times, i in [chain_start[c], chain_start[c+1]), ascending. */
+	 * times (or more, where that is the most that chain.h counts), i in
+	 * [chain_start[c], chain_start[c+1]), ascending. */
 	size_t chains, chain_events;
 	uint64_t *chain_start;
 	uint32_t *chain_event, *chain_count;

@@ -9,6 +9,7 @@ enum { MAX_SPLITS = 4 };
 struct flight {
 	double org[3], dir[3], w;
 	uint32_t chain;
+	uint32_t passed;   /* ideal surfaces so far */
 	int splits;
 };
 
@@ -46,7 +47,7 @@ static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_
 
 	if (chain == CHAIN_NONE)
 		return 0;
-	if (chains_length(&t->tally.chains, chain) > t->job->o.depth) {
+	if (in->passed >= t->job->o.depth) {
 		tally_rest(&t->tally, chain)->cut += w;
 		return 0;
 	}
@@ -59,6 +60,7 @@ static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_
 	ray_leave(t->job->rays, n, out->org);
 	out->w = w;
 	out->chain = chain;
+	out->passed = in->passed + 1;
 	return 1;
 }
 
@@ -123,6 +125,7 @@ void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], do
 	}
 	stack[0].w = w;
 	stack[0].chain = chain;
+	stack[0].passed = 0;
 	stack[0].splits = 0;
 	while (n > 0) {
 		n--;

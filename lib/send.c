@@ -1,6 +1,7 @@
 #include "send.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #include "bsdf.h"
 #include "mem.h"
@@ -48,6 +49,8 @@ static void go_on(struct sender *s, uint32_t chain, uint32_t material, int side,
 		if (slot == CHAIN_NONE)
 			continue;
 		uint32_t child = ((const uint32_t *)c->child.data)[(size_t)chain * c->events + slot];
+		if (child == chain) /* summed by go_round */
+			continue;
 		/* Chain 0 cannot be a child: it marks flux that no row follows. */
 		into_chain(s, child == CHAIN_NONE ? 0 : child, x,
 		           (transmitted ? mt->tau_s : mt->rho_s) + at);
@@ -113,6 +116,51 @@ static void deposit(struct sender *s, struct solution *sol, const struct run *r,
 	}
 }
 
+/* How much of the flux in a block comes back to it, per band, through events whose
+ * count has stopped: the ratio of a geometric series. */
+static void loop_gain(const struct sender *s, const struct block *block, double *gain)
+{
+	const struct chains *c = &s->t->chains;
+	const struct materials *mt = &s->m->material;
+	const uint32_t *child = (const uint32_t *)c->child.data + (size_t)block->chain * c->events;
+
+	memset(gain, 0, (size_t)s->bands * sizeof *gain);
+	for (uint32_t event = 0; event < c->events; event++) {
+		uint32_t id = c->event[event];
+		size_t at = material_at(mt, id / 4, (int)(id / 2 % 2));
+		double landed = 0;
+		if (child[event] != block->chain)
+			continue;
+		for (uint64_t i = block->run; i < block[1].run; i++) {
+			uint32_t target = s->t->run[i].target;
+			if (2 * model_patch_material(s->m, target >> 1) + (target & 1) == id / 2)
+				landed += s->t->run[i].sum;
+		}
+		for (int k = 0; k < s->bands; k++)
+			gain[k] += (id & 1 ? mt->tau_s : mt->rho_s)[at + (size_t)k] * landed / block->sum;
+	}
+}
+
+/* All flux that lands from a block when `in` comes into it: once, and again each
+ * time round. What could go round for ever is left in `cut`, if that is asked for. */
+static void go_round(struct sender *s, const struct block *block, double *in, double *cut)
+{
+	double gain[BANDS_MAX];
+
+	if (block->chain == 0 || !(block->sum > 0))
+		return;
+	loop_gain(s, block, gain);
+	for (int k = 0; k < s->bands; k++) {
+		if (gain[k] < 1 - 1e-9) {
+			in[k] /= 1 - gain[k];
+		} else {
+			if (cut)
+				cut[k] += in[k];
+			in[k] = 0;
+		}
+	}
+}
+
 void send_row(struct sender *s, struct solution *sol, uint32_t row, int freshness,
               const double *flux, struct sent *sent)
 {
@@ -125,12 +173,14 @@ void send_row(struct sender *s, struct solution *sol, uint32_t row, int freshnes
 		if (block->chain)
 			take(s, block->chain, in);
 		for (int k = 0; k < bands; k++) {
-			in[k] = (block->chain ? in[k] : flux[k]) / (block->sum > 0 ? block->sum : 1);
+			in[k] = block->chain ? in[k] : flux[k];
 			any += in[k];
 		}
 		if (!(any > 0))
 			continue;
+		go_round(s, block, in, sent->cut);
 		for (int k = 0; k < bands; k++) {
+			in[k] /= block->sum > 0 ? block->sum : 1;
 			sent->escaped[k] += in[k] * block->escape;
 			sent->absorbed[k] += in[k] * block->black;
 			sent->lost[k] += in[k] * block->lost;
@@ -161,8 +211,8 @@ void send_block_flux(struct sender *s, uint32_t row, const double *flux, double 
 		if (block->chain)
 			take(s, block->chain, in);
 		else
-			for (int k = 0; k < bands; k++)
-				in[k] = flux[k];
+			memcpy(in, flux, (size_t)bands * sizeof *in);
+		go_round(s, block, in, NULL);
 		for (uint64_t i = block->run; t->chains.events && i < block[1].run; i++) {
 			const struct run *r = &t->run[i];
 			for (int k = 0; k < bands; k++)
