@@ -27,7 +27,10 @@ def run(tool, *arguments, expect=0, seconds=600):
     """Runs a program; returns its result, or raises if the status is another
     than expected (None: any)."""
     words = [os.path.join(BUILD, tool), *map(str, arguments)]
-    result = subprocess.run(words, capture_output=True, text=True, timeout=seconds)
+    try:
+        result = subprocess.run(words, capture_output=True, text=True, timeout=seconds)
+    except subprocess.TimeoutExpired:
+        raise Failed(f"{tool} took more than {seconds} s") from None
     if expect is not None and result.returncode != expect:
         tail = result.stderr.strip().splitlines()[-1:] or ["(no message)"]
         raise Failed(f"{tool} exited {result.returncode}: {tail[0]}")

@@ -36,14 +36,18 @@ from oracle2gltf import INSIDE, convert, oracles, unsupported
 # One line a group: patch and element size as fractions of the longest face edge,
 # samples of each method, where shooting stops.
 GROUPS = {
-    #           patch  element  hemicube              rays              shoot
-    "furnace":  (1/4,  1/4,  ["-n", "128"], ["-n", "4096"], ["-e", "1e-12"]),
-    "network":  (1/12, 1/24, ["-n", "128"], ["-n", "16384"], ["-e", "1e-8"]),
-    "cie":      (1/12, 1/24, ["-n", "128"], ["-n", "16384"], ["-e", "1e-8"]),
-    "specular": (1/12, 1/12, ["-n", "128"], ["-n", "16384"], ["-e", "1e-8"]),
+    #           patch  element  hemicube                      rays              shoot
+    "furnace":  (1/4,  1/4,  ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-12"]),
+    "network":  (1/8,  1/16, ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-9"]),
+    "cie":      (1/8,  1/16, ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-9"]),
+    "specular": (1/8,  1/8,  ["-n", "128", "-p", "64"], ["-n", "131072"], ["-e", "1e-9"]),
 }
+# Other mesh sizes, by name.
+MESHES = {"infinite_plates_*": (1/2, 1/4)}
 PARTICLES = ["--samples", "4000000"]
 VIEW = ["-s", "64x64", "--samples", "1", "--compression", "none"]
+
+REFLECTED = 2  # row_kind of lobes about the mirror direction, ff(5)
 
 NAMED = ["furnace_hetero_diffuse", "furnace_partition_diffuse",
          "infinite_plates_directional_partition_n1", "infinite_plates_directional_partition_n10",
@@ -119,7 +123,7 @@ def fitted_weights(corners, point):
     point of their plane. corners: [n][3][3]; returns indices and weights."""
     point = np.asarray(point, float)
     distance = np.linalg.norm(corners.mean(1) - point, axis=1)
-    near = np.argsort(distance, kind="stable")[:24]
+    near = np.argsort(distance, kind="stable")[:48]
     tri = corners[near]
     u = tri[0, 1] - tri[0, 0]
     u /= np.linalg.norm(u)
@@ -166,16 +170,20 @@ def surface_value(oracle, method, e, field):
     return Value(oracle["id"], method, e, w @ got, math.sqrt(((w * error) ** 2).sum()), what)
 
 
-def reflected_fraction(oracle, method, e, field):
+def reflected_fraction(oracle, method, e, field, ff):
     """Flux on the receiver over flux reflected by the lobe; the receiver sees no
-    emitter directly."""
+    emitter directly. The error is that of the lobe's own form factors: how much light
+    comes to the lobe cancels."""
     mirror, receiver = field.faces("mirror", "front"), field.faces(e["face"], "front")
     rho = oracle["materials"]["m"]["front"]["rho_s"]
     flux = lambda rows: (field.h[rows] * field.area[rows]).sum()
-    spread = lambda rows: math.sqrt(((field.error[rows] * field.area[rows]) ** 2).sum())
-    sent, got = rho * flux(mirror), flux(receiver)
-    ratio = got / sent if sent else math.nan
-    error = math.hypot(spread(receiver), ratio * rho * spread(mirror)) / sent if sent else math.nan
+    ratio = flux(receiver) / (rho * flux(mirror)) if flux(mirror) else math.nan
+    if ff:
+        _, arrays = container(ff)
+        error = arrays["row_error"][arrays["row_kind"] == REFLECTED].max(initial=0)
+    else:
+        spread = (field.error[receiver] * field.area[receiver])
+        error = math.sqrt((spread ** 2).sum()) / (rho * flux(mirror)) if flux(mirror) else math.nan
     return Value(oracle["id"], method, e, ratio, error, "flux fraction receiver")
 
 
@@ -188,14 +196,19 @@ def escaped(oracle, method, e, field, ledger):
                  math.sqrt(sum(a * a for a in absorbed)), "escaped flux")
 
 
-def pixels(oracle, method, e, rad, folder):
-    """All pixels of all cameras."""
+def pixels(oracle, method, e, field, rad, folder):
+    """All pixels of all cameras. A pixel is a sum of w_k B_k / pi along its mirror path
+    with sum w_k (1 - rho_s,k) = 1, so its error is at most the largest of
+    error(B) / (pi (1 - rho_s))."""
+    rho = {f["name"]: oracle["materials"][f["mat"]]["front"]["rho_s"] for f in oracle["faces"]}
+    rows = np.array([i for i, n in enumerate(field.name) if rho[n] < 1])
+    error = error_of_b(field, rows, oracle) / (1 - np.array([rho[field.name[i]] for i in rows]))
     for view, *_ in INSIDE:
         path = os.path.join(folder, view + ".exr")
         run("trace", rad, "-c", view, "-o", path, *VIEW)
         planes = picture(path)
         got = np.concatenate([planes[c].ravel() for c in "RGB"])
-        yield Value(oracle["id"], method, e, got, 0, f"every pixel of camera {view}")
+        yield Value(oracle["id"], method, e, got, error.max() / math.pi, f"every pixel of camera {view}")
 
 
 def chain_field(rad):
@@ -220,7 +233,7 @@ def particle_field(mesh):
     return Field(rows, error, arrays["vertex"][arrays["element"][elements].astype(int)]), None
 
 
-def values_of(oracle, method, field, ledger, rad, folder):
+def values_of(oracle, method, field, ledger, folder, ff=None, rad=None):
     for e in oracle["expect"]:
         if e["quantity"] in ("H", "B"):
             if e["quantity"] == "B" and np.isnan(field.b).all():
@@ -229,9 +242,9 @@ def values_of(oracle, method, field, ledger, rad, folder):
         elif e["quantity"] == "escaped_flux":
             yield escaped(oracle, method, e, field, ledger)
         elif e["quantity"] == "fraction_of_mirror_reflected_flux":
-            yield reflected_fraction(oracle, method, e, field)
+            yield reflected_fraction(oracle, method, e, field, ff)
         elif e["quantity"] == "pixel_radiance" and rad:
-            yield from pixels(oracle, method, e, rad, folder)
+            yield from pixels(oracle, method, e, field, rad, folder)
 
 
 def evaluate(oracle, method, folder):
@@ -240,6 +253,9 @@ def evaluate(oracle, method, folder):
     if reason:
         return [Note(oracle["id"], method, reason, False)]
     patch, element, cube, rays, stop = GROUPS[oracle["group"]]
+    for pattern, sizes in MESHES.items():
+        if fnmatch.fnmatchcase(oracle["id"], pattern):
+            patch, element = sizes
     longest = max(np.linalg.norm(np.subtract(f["verts"][0], f["verts"][i]))
                   for f in oracle["faces"] for i in (1, -1))
     path = lambda suffix: os.path.join(folder, oracle["id"] + suffix)
@@ -248,12 +264,12 @@ def evaluate(oracle, method, folder):
         run("mesh", path(".gltf"), "-o", path(".mesh"), "-p", patch * longest, "-e", element * longest)
         if method == "reference":
             field, ledger = particle_field(path(".mesh"))
-            return list(values_of(oracle, method, field, ledger, None, folder))
+            return list(values_of(oracle, method, field, ledger, folder))
         run("ffcalc", path(".mesh"), "-o", path(".ff"), "-m", method,
             *(cube if method == "hemicube" else rays))
         run("shoot", path(".mesh"), path(".ff"), "-o", path(".rad"), *stop)
         field, ledger = chain_field(path(".rad"))
-        return list(values_of(oracle, method, field, ledger, path(".rad"), folder))
+        return list(values_of(oracle, method, field, ledger, folder, path(".ff"), path(".rad")))
     except Failed as problem:
         return [Note(oracle["id"], method, str(problem), True)]
 
