@@ -4,36 +4,13 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "check.h"
 #include "mem.h"
 
 /* How well stored rows close: far above rounding, far below any real error. */
 static const double closure_slack = 1e-9;
 /* Directions are float32. */
 static const double unit_slack = 1e-3;
-
-/* start[0] = 0, never descending by less than `least`, start[n] = end. */
-static int ascends(const char *name, const uint64_t *start, size_t n, size_t end,
-                   uint64_t least, struct err *e)
-{
-	if (start[0] != 0 || start[n] != end)
-		return err_set(e, "array %s: it runs from %" PRIu64 " to %" PRIu64
-		               " and should from 0 to %zu", name, start[0], start[n], end);
-	for (size_t i = 0; i < n; i++)
-		if (start[i + 1] < start[i] || start[i + 1] - start[i] < least)
-			return err_set(e, "array %s: values %zu and %zu do not ascend as they should",
-			               name, i, i + 1);
-	return 0;
-}
-
-static int in_range(const char *name, const uint32_t *index, size_t n, size_t limit,
-                    struct err *e)
-{
-	for (size_t i = 0; i < n; i++)
-		if (index[i] >= limit)
-			return err_set(e, "array %s: value %zu is %" PRIu32 ", which must be below "
-			               "%zu", name, i, index[i], limit);
-	return 0;
-}
 
 static int not_negative(const char *name, const double *v, size_t n, struct err *e)
 {
@@ -80,8 +57,8 @@ static int check_chains(const struct ff *f, size_t materials, struct err *e)
 {
 	if (f->chains == 0)
 		return err_set(e, "array chain_start: there is no chain 0");
-	if (ascends("chain_start", f->chain_start, f->chains, f->chain_events, 0, e) ||
-	    in_range("chain_event", f->chain_event, f->chain_events, 4 * materials, e))
+	if (check_starts("chain_start", f->chain_start, f->chains, f->chain_events, 0, e) ||
+	    check_below("chain_event", f->chain_event, f->chain_events, 4 * materials, e))
 		return -1;
 	if (f->chain_start[1] != 0)
 		return err_set(e, "array chain_start: chain 0 is not empty");
@@ -154,10 +131,10 @@ static int check_closure(const struct ff *f, size_t r, struct err *e)
 
 static int check_rows(const struct ff *f, struct err *e)
 {
-	if (ascends("row_block", f->row_block, f->rows, f->blocks, 1, e) ||
-	    ascends("block_start", f->block_start, f->blocks, f->entries, 0, e) ||
-	    ascends("block_arrival", f->block_arrival, f->blocks, f->arrivals, 0, e) ||
-	    in_range("block_chain", f->block_chain, f->blocks, f->chains, e) ||
+	if (check_starts("row_block", f->row_block, f->rows, f->blocks, 1, e) ||
+	    check_starts("block_start", f->block_start, f->blocks, f->entries, 0, e) ||
+	    check_starts("block_arrival", f->block_arrival, f->blocks, f->arrivals, 0, e) ||
+	    check_below("block_chain", f->block_chain, f->blocks, f->chains, e) ||
 	    not_negative("row_error", f->row_error, f->rows, e) ||
 	    not_negative("block_escape", f->block_escape, f->blocks, e) ||
 	    not_negative("block_black", f->block_black, f->blocks, e) ||
@@ -244,8 +221,8 @@ static int link_order(const struct ff *f, size_t l)
 
 static int check_links(const struct ff *f, size_t patches, struct err *e)
 {
-	if (in_range("link_target", f->link_target, f->links, 2 * patches, e) ||
-	    in_range("link_chain", f->link_chain, f->links, f->chains, e) ||
+	if (check_below("link_target", f->link_target, f->links, 2 * patches, e) ||
+	    check_below("link_chain", f->link_chain, f->links, f->chains, e) ||
 	    unit_vectors("link_direction", f->link_direction, f->links, e))
 		return -1;
 	for (size_t l = 0; l < f->links; l++) {
@@ -279,7 +256,7 @@ int ff_check(const struct ff *f, const struct ff_scene *s, struct err *e)
 	return check_scene(s, e) || check_part(f, s->patches, e) ||
 	       check_chains(f, s->materials, e) || check_rows(f, e) ||
 	       check_entries(f, s, e) ||
-	       in_range("arrival_target", f->arrival_target, f->arrivals, 2 * s->patches, e) ||
+	       check_below("arrival_target", f->arrival_target, f->arrivals, 2 * s->patches, e) ||
 	       unit_vectors("arrival_direction", f->arrival_direction, f->arrivals, e) ||
 	       check_links(f, s->patches, e) ? -1 : 0;
 }

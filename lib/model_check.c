@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "check.h"
 #include "material_rules.h"
 #include "mem.h"
 #include "vec3.h"
@@ -177,16 +178,6 @@ static int check_cameras(const struct model *m, struct err *e)
 
 /* ---- arrays ---- */
 
-static int in_range(const char *name, const uint32_t *index, size_t n, size_t limit,
-                    struct err *e)
-{
-	for (size_t i = 0; i < n; i++)
-		if (index[i] >= limit)
-			return err_set(e, "array %s: value %zu is %" PRIu32 ", which must be below "
-			               "%zu", name, i, index[i], limit);
-	return 0;
-}
-
 static int finite_f64(const char *name, const double *v, size_t n, struct err *e)
 {
 	for (size_t i = 0; i < n; i++)
@@ -203,20 +194,6 @@ static int finite_f32(const char *name, const float *v, size_t n, struct err *e)
 	return 0;
 }
 
-/* start[0] = 0, steps of at least `least`, start[n] = end. */
-static int ascends(const char *name, const uint64_t *start, size_t n, uint64_t end,
-                   uint64_t least, struct err *e)
-{
-	if (start[0] != 0 || start[n] != end)
-		return err_set(e, "array %s: it runs from %" PRIu64 " to %" PRIu64
-		               " and should from 0 to %" PRIu64, name, start[0], start[n], end);
-	for (size_t i = 0; i < n; i++)
-		if (start[i + 1] < start[i] || start[i + 1] - start[i] < least)
-			return err_set(e, "array %s: values %zu and %zu do not ascend as they should",
-			               name, i, i + 1);
-	return 0;
-}
-
 static int check_surfaces(const struct model *m, struct err *e)
 {
 	const struct surfaces *s = &m->surface;
@@ -224,15 +201,15 @@ static int check_surfaces(const struct model *m, struct err *e)
 	for (size_t i = 0; i < s->n; i++)
 		if (s->has_normals[i] > 1)
 			return err_set(e, "array surface_has_normals: value %zu is not 0 or 1", i);
-	return in_range("surface_material", s->material, s->n, m->material.n, e) ||
+	return check_below("surface_material", s->material, s->n, m->material.n, e) ||
 	       unique_names("surfaces", s->name, s->n, e) ? -1 : 0;
 }
 
 static int check_vertices_and_triangles(const struct model *m, struct err *e)
 {
 	return finite_f64("vertex", m->vertex, 3 * m->vertices, e) ||
-	       in_range("triangle", m->triangle, 3 * m->triangles, m->vertices, e) ||
-	       in_range("triangle_surface", m->triangle_surface, m->triangles,
+	       check_below("triangle", m->triangle, 3 * m->triangles, m->vertices, e) ||
+	       check_below("triangle_surface", m->triangle_surface, m->triangles,
 	                m->surface.n, e) ||
 	       finite_f32("triangle_uv", m->triangle_uv, 6 * m->triangles, e) ||
 	       finite_f32("triangle_normal", m->triangle_normal, 9 * m->triangles, e) ? -1 : 0;
@@ -240,8 +217,8 @@ static int check_vertices_and_triangles(const struct model *m, struct err *e)
 
 static int check_elements(const struct model *m, struct err *e)
 {
-	if (in_range("element", m->element, 3 * m->elements, m->vertices, e) ||
-	    in_range("element_triangle", m->element_triangle, m->elements, m->triangles, e))
+	if (check_below("element", m->element, 3 * m->elements, m->vertices, e) ||
+	    check_below("element_triangle", m->element_triangle, m->elements, m->triangles, e))
 		return -1;
 	for (size_t i = 0; i < m->elements; i++) {
 		const uint32_t *c = &m->element[3 * i];
@@ -332,7 +309,7 @@ static int check_patches(const struct model *m, struct err *e)
 {
 	const uint32_t *start = m->patch_start;
 
-	if (in_range("patch_surface", m->patch_surface, m->patches, m->surface.n, e))
+	if (check_below("patch_surface", m->patch_surface, m->patches, m->surface.n, e))
 		return -1;
 	if (start[0] != 0 || start[m->patches] != m->elements)
 		return err_set(e, "array patch_start: it runs from %" PRIu32 " to %" PRIu32
@@ -351,9 +328,9 @@ static int check_patches(const struct model *m, struct err *e)
 
 static int check_loops(const struct model *m, struct err *e)
 {
-	return ascends("patch_loop", m->patch_loop, m->patches, m->loops, 0, e) ||
-	       ascends("loop_start", m->loop_start, m->loops, m->loop_indices, 3, e) ||
-	       in_range("loop_index", m->loop_index, m->loop_indices, m->vertices, e) ? -1 : 0;
+	return check_starts("patch_loop", m->patch_loop, m->patches, m->loops, 0, e) ||
+	       check_starts("loop_start", m->loop_start, m->loops, m->loop_indices, 3, e) ||
+	       check_below("loop_index", m->loop_index, m->loop_indices, m->vertices, e) ? -1 : 0;
 }
 
 /* Element-sides are 32-bit, elements and splits share a signed 32-bit number. */

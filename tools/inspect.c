@@ -20,6 +20,8 @@
 #include "../lib/verify.h"
 #include "common/cli.h"
 
+enum { SHOWN = 60 };
+
 #define PATCH_MATRIX "patch-matrix"
 
 static const struct cli_option options[] = {
@@ -173,15 +175,25 @@ static void print_block(const char *key, const char *text)
 	}
 }
 
+/* Bytes of a list to print: SHOWN, less what would cut a UTF-8 character. */
+static int shown(const char *text)
+{
+	size_t n = strlen(text) < SHOWN ? strlen(text) : SHOWN;
+
+	while (n && ((unsigned char)text[n] & 0xc0) == 0x80)
+		n--;
+	return (int)n;
+}
+
 static void print_meta(const char *key, const char *value)
 {
 	json_t *j = meta_value(value);
 	char *lines = json_is_string(j) ? NULL : json_dumps(j, JSON_INDENT(2) |
 	                                                   JSON_REAL_PRECISION(17));
 
-	if (json_is_array(j))
-		printf("%-12s %zu: %.60s%s\n", key, json_array_size(j), value,
-		       strlen(value) > 60 ? " ..." : "");
+	if (json_is_array(j)) /* names, which may be many */
+		printf("%-12s %zu: %.*s%s\n", key, json_array_size(j), shown(value), value,
+		       strlen(value) > SHOWN ? " ..." : "");
 	else if (lines || strcmp(key, "history") == 0)
 		print_block(key, lines ? lines : value);
 	else
