@@ -266,6 +266,29 @@ static size_t cluster_end(const struct ff_job *j, const struct capture *c, size_
 	return end;
 }
 
+/* Rays for the rows of a cluster: emitters, whose highlights are what is seen, share
+ * emitter_gain times what the others do. */
+static uint32_t cluster_rays(const struct ff_job *j, const struct capture *c, double share,
+                             size_t emitters)
+{
+	double rays = j->emits[c->source]
+	            ? (double)j->o.lobe_rays * j->o.emitter_gain / (double)emitters
+	            : fmin(1, share) * j->o.lobe_rays;
+
+	return rays > MIN_LOBE_RAYS ? (uint32_t)rays : MIN_LOBE_RAYS;
+}
+
+/* Emitters, by chain, among sorted captures. */
+static size_t count_emitters(const struct ff_job *j, const struct capture *c, size_t n)
+{
+	size_t emitters = 0;
+
+	for (size_t i = 0; i < n; i++)
+		emitters += j->emits[c[i].source] &&
+		            (i == 0 || c[i].source != c[i - 1].source || c[i].chain != c[i - 1].chain);
+	return emitters;
+}
+
 int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch *b,
              struct err *e)
 {
@@ -273,7 +296,7 @@ int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch
 	const struct capture *c;
 	uint8_t *met = mem_new(2 * j->m->patches, 1, "sources met", e);
 	double all = 0;
-	size_t own = t->captures.n;
+	size_t own = t->captures.n, emitters = 0;
 	int bad = !met;
 
 	c = t->captures.data;
@@ -285,13 +308,13 @@ int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch
 	bad = bad || probe_unseen(t, ps, met, e) || sort_captures(t, e);
 	free(met);
 	c = t->captures.data;
+	if (!bad)
+		emitters = count_emitters(j, c, t->captures.n);
 	for (size_t i = 0, end; !bad && i < t->captures.n; i = end) {
 		double w = 0;
 		end = cluster_end(j, c, i, t->captures.n, all / CLUSTER_SHARE, &w);
-		double share = all > 0 ? fmin(1, w / all) : 0;
-		uint32_t rays = (uint32_t)(share * j->o.lobe_rays);
-		bad = put_link(t, ps, &c[i], end - i, rays > MIN_LOBE_RAYS ? rays : MIN_LOBE_RAYS,
-		               cast, b, e);
+		uint32_t rays = cluster_rays(j, &c[i], all > 0 ? w / all : 0, emitters);
+		bad = put_link(t, ps, &c[i], end - i, rays, cast, b, e);
 		c = t->captures.data;
 	}
 	return bad ? bad : bin_links(t, ps, cast, b, e);

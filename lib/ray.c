@@ -24,6 +24,7 @@ struct ray_scene {
 	RTCScene scene;
 	double centre[3];
 	double unit;        /* world length of one unit inside */
+	double per_unit;    /* 1 / unit */
 	float (*normal)[3]; /* [triangles] front normals */
 };
 
@@ -49,12 +50,13 @@ static void bounds(const struct model *m, struct ray_scene *s)
 	}
 	if (!(s->unit > 0))
 		s->unit = 1;
+	s->per_unit = 1 / s->unit;
 }
 
 static void to_unit(const struct ray_scene *s, const double x[3], float out[3])
 {
 	for (int k = 0; k < 3; k++)
-		out[k] = (float)((x[k] - s->centre[k]) / s->unit);
+		out[k] = (float)((x[k] - s->centre[k]) * s->per_unit);
 }
 
 static int fill_geometry(struct ray_scene *s, const struct model *m, RTCGeometry g,
