@@ -33,6 +33,7 @@ sys.dont_write_bytecode = True
 from chain import Failed, Tap, container, picture, run, table
 from oracle2gltf import INSIDE, convert, oracles, unsupported
 
+LOBES = ["--lobe-rays", "262144"]
 # One line a group: patch and element size as fractions of the longest face edge,
 # samples of each method, where shooting stops.
 GROUPS = {
@@ -40,7 +41,7 @@ GROUPS = {
     "furnace":  (1/4,  1/4,  ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-12"]),
     "network":  (1/8,  1/16, ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-9"]),
     "cie":      (1/8,  1/16, ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-9"]),
-    "specular": (1/8,  1/8,  ["-n", "128", "-p", "64"], ["-n", "131072"], ["-e", "1e-9"]),
+    "specular": (1/8,  1/8,  ["-n", "128", "-p", "64", *LOBES], ["-n", "131072", *LOBES], ["-e", "1e-9"]),
 }
 # Other mesh sizes, by name.
 MESHES = {"infinite_plates_*": (1/2, 1/4)}

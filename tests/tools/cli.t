@@ -10,10 +10,9 @@ help_options() {
 	"$1" --help | grep -o -e '--[a-z][a-z0-9-]*' | sort -u
 }
 
-# Long options in a man page: mdoc writes --name as Fl -name.
+# Long options a man page lists as items: mdoc writes --name as -name.
 page_options() {
-	grep -e '^\.' "$top/man/$1.1" | grep -o -e '\(Fl\|,\||\) -[a-z][a-z0-9-]*' |
-		sed 's/^[^ ]* -/--/' | sort -u
+	grep '^\.It Fl' "$top/man/$1.1" | grep -o -e ' -[a-z][a-z0-9-]*' | sed 's/^ /-/' | sort -u
 }
 
 for tool in $tools; do

@@ -13,6 +13,7 @@ prepare ffcalc "$T/a.mesh" -o "$T/a2.ff" -n 256 -m rays --part 2/3
 prepare ffcalc "$T/a.mesh" -o "$T/a3.ff" -n 256 -m rays --part 3/3
 prepare ffcalc "$T/a.mesh" -o "$T/a12.ff" -n 256 -m rays --part 1/2
 prepare shoot "$T/a.mesh" "$T/a.ff" -o "$T/a.rad"
+prepare shoot "$T/p.mesh" "$T/p.ff" -o "$T/p.rad"
 prepare trace "$T/a.rad" -c inside -o "$T/a.exr" -s 16x12 --samples 1
 
 # Missing files and files of another kind.
@@ -134,8 +135,9 @@ scene_refused "ymax" "negative exponent" \
 	'g["materials"][5]["extras"]["twopass"].update(rho_d=0, rho_s=.1, alpha=-1)'
 scene_refused "ymax" "coefficient that is no number" \
 	'g["materials"][5]["extras"]["twopass"]["rho_d"] = "red"'
-scene_refused "ymax" "coefficients of five bands" \
-	'g["materials"][5]["extras"]["twopass"]["rho_d"] = [.1, .1, .1, .1, .1]'
+scene_refused "2\|3" "coefficients of two and of three bands" '
+g["materials"][5]["extras"]["twopass"]["rho_d"] = [.1, .2]
+g["materials"][4]["extras"]["twopass"]["rho_d"] = [.1, .1, .2]'
 scene_refused "ymax.*shiny\|shiny" "misspelt coefficient" \
 	'g["materials"][5]["extras"]["twopass"]["shiny"] = .1'
 scene_refused "" "NaN vertex" \

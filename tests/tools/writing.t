@@ -6,7 +6,7 @@
 prepare mesh "$scenes/cornell.gltf" -o "$T/a.mesh"
 prepare ffcalc "$T/a.mesh" -o "$T/a.ff" -m rays -n 256
 prepare shoot "$T/a.mesh" "$T/a.ff" -o "$T/a.rad"
-prepare trace "$T/a.rad" -c classic -o "$T/a.exr" -s 64x64 --samples 1
+prepare trace "$T/a.rad" -c classic -o "$T/a.exr" -s 128x128 --samples 1
 
 # writes TOOL OUT: the tool with that output.
 writes() {
@@ -14,9 +14,9 @@ writes() {
 	mesh) mesh "$scenes/cornell.gltf" -o "$2" ;;
 	ffcalc) ffcalc "$T/a.mesh" -m rays -n 256 -o "$2" ;;
 	shoot) shoot "$T/a.mesh" "$T/a.ff" -o "$2" ;;
-	trace) trace "$T/a.rad" -c classic -s 64x64 --samples 1 -o "$2" ;;
-	reference) reference "$T/a.mesh" -c classic -s 64x64 --samples 1 -o "$2" ;;
-	tone) tone "$T/a.exr" -o "$2" ;;
+	trace) trace "$T/a.rad" -c classic -s 128x128 --samples 1 -o "$2" ;;
+	reference) reference "$T/a.mesh" -c classic -s 128x128 --samples 1 -o "$2" ;;
+	tone) tone -q "$T/a.exr" -o "$2" ;;
 	esac
 }
 tools="mesh ffcalc shoot trace reference tone"
@@ -47,9 +47,9 @@ for tool in $tools; do
 	mesh) set -- mesh "$scenes/cornell.gltf" ;;
 	ffcalc) set -- ffcalc "$T/a.mesh" -m rays -n 256 ;;
 	shoot) set -- shoot "$T/a.mesh" "$T/a.ff" ;;
-	trace) set -- trace "$T/a.rad" -c classic -s 64x64 --samples 1 ;;
-	reference) set -- reference "$T/a.mesh" -c classic -s 64x64 --samples 1 ;;
-	tone) set -- tone "$T/a.exr" ;;
+	trace) set -- trace "$T/a.rad" -c classic -s 128x128 --samples 1 ;;
+	reference) set -- reference "$T/a.mesh" -c classic -s 128x128 --samples 1 ;;
+	tone) set -- tone -q "$T/a.exr" ;;
 	esac
 	refuses 1 "locked/out: .*[Pp]ermission denied" "$tool: directory without write permission" \
 		$as "$@" -o "$T/locked/out"
@@ -72,12 +72,15 @@ else
 fi
 
 # Stopped at some moment. ffcalc writes for most of its time.
-mkdir "$T/stop"
-for delay in 0.05 0.2 0.5; do
+# (A shell starts background commands with SIGINT ignored; Python takes that back.)
+awake='import os, signal, sys
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+os.execvp(sys.argv[1], sys.argv[1:])'
+for delay in 0.2 0.5 1; do
 	for signal in KILL INT TERM; do
 		rm -rf "$T/stop" && mkdir "$T/stop"
 		echo old >"$T/stop/a.ff"
-		ffcalc "$T/a.mesh" -q -m rays -n 1048576 -o "$T/stop/a.ff" 2>/dev/null &
+		$PYTHON -c "$awake" ffcalc "$T/a.mesh" -q -m rays -n 1048576 -o "$T/stop/a.ff" 2>/dev/null &
 		process=$!
 		sleep $delay
 		kill -$signal $process 2>/dev/null
