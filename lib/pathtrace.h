@@ -47,7 +47,8 @@ int pathtrace_picture(const struct pathtrace *p, const struct view_frame *f,
 
 /* Irradiance of element-sides, row 2e+s, [2E][bands]; a flux per band. */
 struct pathtrace_irradiance {
-	double *h, *error;          /* and its standard error */
+	double *h, *error;          /* and its standard error: that of one particle
+	                               where none arrived */
 	double emitted[BANDS_MAX];
 	double escaped[BANDS_MAX], escaped_error[BANDS_MAX];
 };

@@ -127,18 +127,21 @@ static void run_all(struct shower *s, const struct progress *progress, double *m
 	}
 }
 
-/* From flux to irradiance and standard errors. */
-static void finish(const struct pathtrace *p, double batches, const double *mean,
-                   const double *squares, struct pathtrace_irradiance *out)
+/* From flux to irradiance and standard errors. Where nothing arrived, the spread
+ * says nothing: the error is that of one particle, for none is no proof of 0. */
+static void finish(const struct pathtrace *p, const struct pathtrace_options *o,
+                   const double *mean, const double *squares,
+                   struct pathtrace_irradiance *out)
 {
 	const struct model *m = p->m;
 	size_t bands = (size_t)m->bands, rows = 2 * m->elements;
-	double scale = 1 / (batches * (batches - 1));
+	double batches = (double)batch_count(o), scale = 1 / (batches * (batches - 1));
 
 	for (size_t i = 0; i < rows * bands; i++) {
 		double area = m->element_area[i / bands / 2];
 		out->h[i] = mean[i] / area;
-		out->error[i] = sqrt(squares[i] * scale) / area;
+		out->error[i] = (mean[i] > 0 ? sqrt(squares[i] * scale)
+		                             : p->emitted[i % bands] / (double)o->samples) / area;
 	}
 	for (size_t b = 0; b < bands; b++) {
 		out->emitted[b] = p->emitted[b];
@@ -166,7 +169,7 @@ int pathtrace_particles(const struct pathtrace *p, const struct pathtrace_option
 	out->error = mem_new(rows, bands * sizeof *out->error, "irradiance", e);
 	if (mean && squares && s.tally && out->h && out->error) {
 		run_all(&s, progress, mean, squares);
-		finish(p, (double)batch_count(o), mean, squares, out);
+		finish(p, o, mean, squares, out);
 		bad = 0;
 	} else {
 		pathtrace_irradiance_free(out);

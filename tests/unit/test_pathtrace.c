@@ -262,7 +262,9 @@ static void test_isolated(void **state)
 	for (size_t patch = 6; patch < 12; patch++)
 		check_patch(&s, &h, patch, FRONT, 0, 2);
 	for (size_t e = 0; e < s.m.elements; e++) {
+		double one = h.emitted[0] / 200000 / s.m.element_area[e];
 		assert_true(h.h[2 * e + BACK] == 0);
+		assert_true(fabs(h.error[2 * e + BACK] / one - 1) < 1e-12);
 		if (e < s.m.patch_start[6])
 			assert_true(h.h[2 * e] == 0);
 	}
