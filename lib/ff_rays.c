@@ -1,5 +1,7 @@
 /* Form factors by rays: cosine-distributed directions jointly stratified with the
  * position on the patch (Owen-scrambled Sobol points in four dimensions). */
+#include <string.h>
+
 #include "ff_job.h"
 #include "lobe.h"
 #include "vec3.h"
@@ -85,21 +87,19 @@ static int reflect(struct ff_thread *t, const struct flight *in, const struct ra
 	return n;
 }
 
-/* Casts a flight, tallies where it lands; returns how many go on into next[], which
- * may begin at the flight itself. */
-static int land(struct ff_thread *t, struct flight *f, struct flight next[2])
+/* Tallies where a flight lands; returns how many go on into next[], which may begin
+ * at the flight itself. */
+static int land(struct ff_thread *t, struct flight *f, const struct ray_hit *hit,
+                uint32_t element, struct flight next[2])
 {
 	const struct ff_job *j = t->job;
-	struct ray_hit hit;
 
-	ray_nearest(j->rays, f->org, f->dir, &hit);
 	t->rays++;
-	if (hit.triangle == RAY_MISS) {
+	if (hit->triangle == RAY_MISS) {
 		tally_rest(&t->tally, f->chain)->escape += f->w;
 		return 0;
 	}
-	uint32_t element = locate(&j->locator, hit.triangle, hit.w);
-	uint32_t side = (uint32_t)hit.side, ps = 2 * j->m->element_patch[element] + side;
+	uint32_t side = (uint32_t)hit->side, ps = 2 * j->m->element_patch[element] + side;
 	if (j->is_black[ps]) {
 		tally_rest(&t->tally, f->chain)->black += f->w;
 		return 0;
@@ -110,14 +110,30 @@ static int land(struct ff_thread *t, struct flight *f, struct flight next[2])
 	if (!j->is_ideal[ps])
 		return 0;
 	uint32_t id = 4 * model_patch_material(j->m, ps >> 1) + 2 * side;
-	return reflect(t, f, &hit, element, &t->tally.chains.slot[id], next);
+	return reflect(t, f, hit, element, &t->tally.chains.slot[id], next);
+}
+
+static uint32_t element_of(const struct ff_job *j, const struct ray_hit *hit)
+{
+	return hit->triangle == RAY_MISS ? 0 : locate(&j->locator, hit->triangle, hit->w);
+}
+
+/* Casts the flights of a stack and all that come of them. */
+static void fly(struct ff_thread *t, struct flight *stack, int n)
+{
+	struct ray_hit hit;
+
+	while (n > 0) {
+		n--;
+		ray_nearest(t->job->rays, stack[n].org, stack[n].dir, &hit);
+		n += land(t, &stack[n], &hit, element_of(t->job, &hit), &stack[n]);
+	}
 }
 
 void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], double w,
                uint32_t chain)
 {
 	struct flight stack[MAX_SPLITS + 3];
-	int n = 1;
 
 	for (int k = 0; k < 3; k++) {
 		stack[0].org[k] = org[k];
@@ -127,10 +143,7 @@ void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], do
 	stack[0].chain = chain;
 	stack[0].passed = 0;
 	stack[0].splits = 0;
-	while (n > 0) {
-		n--;
-		n += land(t, &stack[n], &stack[n]);
-	}
+	fly(t, stack, 1);
 }
 
 /* ---- rows ---- */
@@ -149,43 +162,85 @@ static struct scramble scramble(const struct ff_job *j, uint32_t row, uint32_t r
 	return s;
 }
 
-static void sample(const struct ff_job *j, const struct scramble *s, uint32_t i,
-                   double u[FF_DIMS])
+/* Rays are made, cast, located and tallied by the batch: each loop then overlaps the
+ * latencies of many rays, where one ray at a time would wait for each in turn. */
+enum { BATCH = 64 };
+
+struct batch {
+	double u[BATCH][4];
+	struct flight flight[BATCH];
+	struct ray_hit hit[BATCH];
+	uint32_t from[BATCH];      /* element the ray leaves */
+	uint32_t element[BATCH];   /* element it hits */
+};
+
+static void batch_numbers(const struct ff_job *j, const struct scramble *s, uint32_t first,
+                          uint32_t n, struct batch *b)
 {
-	for (int d = 0; d < FF_DIMS; d++)
-		u[d] = i < j->sobol_points
-		         ? rng_scramble(j->sobol[(size_t)i * FF_DIMS + (size_t)d], s->seed[d])
-		         : rng_scramble(rng_sobol_bits(i, d), s->seed[d]);
+	for (uint32_t i = 0; i < n; i++) {
+		uint32_t index = first + i;
+		const uint32_t *bits = &j->sobol[(size_t)(index < j->sobol_points ? index : 0) * FF_DIMS];
+		for (int d = 0; d < 4; d++)
+			b->u[i][d] = rng_scramble(index < j->sobol_points
+			                          ? bits[d] : rng_sobol_bits(index, d), s->seed[d]);
+	}
 }
 
-/* Casts `count` rays from a patch-side: Lambertian (exponent < 0) or as an emission
- * lobe about the normal. */
+/* Where the rays begin and go: Lambertian (exponent < 0) or an emission lobe about
+ * the normal. */
+static void batch_flights(const struct ff_job *j, uint32_t ps, double exponent, uint32_t n,
+                          struct batch *b)
+{
+	for (uint32_t i = 0; i < n; i++) {
+		struct flight *f = &b->flight[i];
+		double normal[3];
+		b->from[i] = ff_point(j, ps >> 1, b->u[i][0], b->u[i][1], f->org);
+		ff_normal(j, b->from[i], (int)(ps & 1), normal);
+		if (exponent < 0)
+			lobe_sample_cosine(normal, &b->u[i][2], f->dir);
+		else
+			lobe_sample(exponent, normal, normal, &b->u[i][2], f->dir);
+		ray_leave(j->rays, normal, f->org);
+		f->w = 1;
+		f->chain = f->passed = 0;
+		f->splits = 0;
+	}
+}
+
+static void batch_land(struct ff_thread *t, int side, uint32_t n, struct batch *b)
+{
+	struct flight stack[MAX_SPLITS + 3];
+
+	for (uint32_t i = 0; i < n; i++) {
+		struct flight *f = &b->flight[i];
+		if (t->capturing) {
+			double normal[3];
+			t->now = (struct capture){ .element = b->from[i] };
+			ff_normal(t->job, b->from[i], side, normal);
+			v3_mad(f->org, -ray_offset(t->job->rays), normal, t->now.x);
+			memcpy(t->now.l, f->dir, sizeof t->now.l);
+		}
+		fly(t, stack, land(t, f, &b->hit[i], b->element[i], stack));
+	}
+}
+
 static void cast(struct ff_thread *t, uint32_t ps, uint32_t count, double exponent)
 {
 	const struct ff_job *j = t->job;
-	int side = (int)(ps & 1);
+	uint32_t each = count / FF_REPLICATES;
+	struct batch b;
 
 	for (uint32_t r = 0; r < FF_REPLICATES; r++) {
-		uint32_t kind = exponent < 0 ? 0 : 1;
-		struct scramble s = scramble(j, 2 * ps + kind, r);
-		for (uint32_t i = 0; i < count / FF_REPLICATES; i++) {
-			double u[FF_DIMS], n[3], dir[3], x[3];
-			sample(j, &s, i, u);
-			uint32_t element = ff_point(j, ps >> 1, u[0], u[1], x);
-			ff_normal(j, element, side, n);
-			if (exponent < 0)
-				lobe_sample_cosine(n, &u[2], dir);
-			else
-				lobe_sample(exponent, n, n, &u[2], dir);
-			if (t->capturing) {
-				t->now = (struct capture){ .element = element };
-				for (int k = 0; k < 3; k++) {
-					t->now.x[k] = x[k];
-					t->now.l[k] = dir[k];
-				}
-			}
-			ray_leave(j->rays, n, x);
-			ff_follow(t, x, dir, 1, 0);
+		struct scramble s = scramble(j, 2 * ps + (exponent >= 0), r);
+		for (uint32_t first = 0; first < each; first += BATCH) {
+			uint32_t n = each - first < BATCH ? each - first : BATCH;
+			batch_numbers(j, &s, first, n, &b);
+			batch_flights(j, ps, exponent, n, &b);
+			for (uint32_t i = 0; i < n; i++)
+				ray_nearest(j->rays, b.flight[i].org, b.flight[i].dir, &b.hit[i]);
+			for (uint32_t i = 0; i < n; i++)
+				b.element[i] = element_of(j, &b.hit[i]);
+			batch_land(t, (int)(ps & 1), n, &b);
 		}
 		tally_replicate(&t->tally);
 	}

@@ -119,14 +119,31 @@ double lobe_albedo(double k, double cos_theta)
 	       albedo_piece(k, c, s, second, end);
 }
 
+/* Cosine and sine of phi in [0, 2 pi) to 1e-11, by Taylor series at the half angle,
+ * without branches: directions are sampled by the hundred million. */
+static void turn(double phi, double *x, double *y)
+{
+	double h = phi / 2 - pi / 2, q = h * h; /* |h| <= pi / 2 */
+	double s = h * (1 + q * (-1. / 6 + q * (1. / 120 + q * (-1. / 5040 + q * (1. / 362880 +
+	           q * (-1. / 39916800 + q * (1. / 6227020800. + q * (-1. / 1307674368000.))))))));
+	double c = 1 + q * (-1. / 2 + q * (1. / 24 + q * (-1. / 720 + q * (1. / 40320 +
+	           q * (-1. / 3628800 + q * (1. / 479001600. + q * (-1. / 87178291200. +
+	           q * (1. / 20922789888000.))))))));
+
+	/* phi = 2 h + pi */
+	*x = 2 * s * s - 1;
+	*y = -2 * s * c;
+}
+
 static void in_frame(const double axis[3], double sine, double cosine, double phi,
                      double out[3])
 {
-	double t[3], b[3];
+	double t[3], b[3], x, y;
 
+	turn(phi, &x, &y);
 	v3_frame(axis, t, b);
 	for (int i = 0; i < 3; i++)
-		out[i] = sine * (cos(phi) * t[i] + sin(phi) * b[i]) + cosine * axis[i];
+		out[i] = sine * (x * t[i] + y * b[i]) + cosine * axis[i];
 }
 
 void lobe_sample_whole(double k, const double axis[3], const double u[2], double out[3])

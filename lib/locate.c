@@ -20,26 +20,94 @@ static uint32_t grid_size(uint32_t k)
 	return n;
 }
 
-/* The element at a corner of a cell, moved a little towards the cell's centre. */
-static uint32_t corner(const struct model *m, uint32_t tri, uint32_t n, double x, double y)
+/* The functions of a child from those of its parent, as model_locate halves weights. */
+static void halve(struct locator_node *n, const struct split *s, int second)
 {
-	double w[3] = { 1 - (x + y) / n, x / n, y / n };
+	int a = s->edge, b = a == 2 ? 0 : a + 1;
+	int keep = second ? b : a, twice = second ? a : b;
 
-	return w[0] < 0 ? UINT32_MAX : model_locate(m, tri, w);
+	n->a[keep] -= n->a[twice];
+	n->b[keep] -= n->b[twice];
+	n->d[keep] -= n->d[twice];
+	n->a[twice] *= 2;
+	n->b[twice] *= 2;
+	n->d[twice] *= 2;
 }
 
-/* Elements are convex, so a cell whose corners lie in one element lies in it. */
-static uint32_t cell_element(const struct model *m, uint32_t tri, uint32_t n, uint32_t i,
-                             uint32_t j)
+/* The functions of every node below a triangle's root. Children follow parents in no
+ * special order, so a stack of nodes to visit is kept. */
+static int fill_nodes(struct locator *l, struct vec *stack, uint32_t tri, struct err *e)
+{
+	int32_t at = l->m->triangle_split[tri];
+
+	if (at < 0)
+		return 0;
+	l->node[at] = (struct locator_node){ { 1, 0, 0 }, { -1, 1, 0 }, { -1, 0, 1 } };
+	stack->n = 0;
+	if (vec_append(stack, &at, 1, sizeof at, e))
+		return -1;
+	while (stack->n) {
+		at = ((int32_t *)stack->data)[--stack->n];
+		const struct split *s = &l->m->split[at];
+		for (int k = 0; k < 2; k++) {
+			if (s->child[k] < 0)
+				continue;
+			l->node[s->child[k]] = l->node[at];
+			halve(&l->node[s->child[k]], s, k);
+			if (vec_append(stack, &s->child[k], 1, sizeof at, e))
+				return -1;
+		}
+	}
+	return 0;
+}
+
+/* The deepest node, or the element, that holds all of a cell: its corners, a little
+ * inwards, go down the tree together for as long as they agree. Corners beyond the
+ * triangle do not count. */
+static int32_t cell_node(const struct model *m, uint32_t tri, uint32_t n, uint32_t i, uint32_t j)
 {
 	const double in = 1e-6;
-	double x[2] = { i + in, i + 1 - in }, y[2] = { j + in, j + 1 - in };
-	uint32_t first = corner(m, tri, n, x[0], y[0]);
+	double w[4][3];
+	int32_t at = m->triangle_split[tri];
+	int corners = 0;
 
-	for (int k = 1; k < 4 && first != UINT32_MAX; k++)
-		if (corner(m, tri, n, x[k & 1], y[k >> 1]) != first)
-			first = UINT32_MAX;
-	return first;
+	for (int k = 0; k < 4; k++) {
+		double x = (i + (k & 1 ? 1 - in : in)) / n, y = (j + (k >> 1 ? 1 - in : in)) / n;
+		if (x + y > 1)
+			continue;
+		w[corners][0] = 1 - x - y;
+		w[corners][1] = x;
+		w[corners++][2] = y;
+	}
+	while (at >= 0 && corners) {
+		const struct split *s = &m->split[at];
+		int a = s->edge, b = a == 2 ? 0 : a + 1, second = w[0][a] < w[0][b];
+		for (int k = 1; k < corners; k++)
+			if ((w[k][a] < w[k][b]) != second)
+				return at;
+		for (int k = 0; k < corners; k++) {
+			int keep = second ? b : a, twice = second ? a : b;
+			w[k][keep] -= w[k][twice];
+			w[k][twice] *= 2;
+		}
+		at = s->child[second];
+	}
+	return at;
+}
+
+static int fill(struct locator *l, struct err *e)
+{
+	struct vec stack = { 0 };
+	int bad = 0;
+
+	for (uint32_t t = 0; !bad && t < l->m->triangles; t++) {
+		uint32_t n = l->size[t];
+		bad = fill_nodes(l, &stack, t, e);
+		for (uint32_t k = 0; !bad && k < n * n; k++)
+			l->cell[l->first[t] + k] = cell_node(l->m, t, n, k % n, k / n);
+	}
+	free(stack.data);
+	return bad;
 }
 
 int locator_init(struct locator *l, const struct model *m, struct err *e)
@@ -49,7 +117,8 @@ int locator_init(struct locator *l, const struct model *m, struct err *e)
 	*l = (struct locator){ .m = m };
 	l->first = mem_new(m->triangles, sizeof *l->first, "element lookup", e);
 	l->size = mem_new(m->triangles, sizeof *l->size, "element lookup", e);
-	if (!l->first || !l->size)
+	l->node = mem_new(m->splits, sizeof *l->node, "element lookup", e);
+	if (!l->first || !l->size || !l->node)
 		return -1;
 	for (size_t i = 0; i < m->elements; i++)
 		l->size[m->element_triangle[i]]++;
@@ -58,12 +127,8 @@ int locator_init(struct locator *l, const struct model *m, struct err *e)
 		l->first[t] = cells;
 		cells += (uint64_t)l->size[t] * l->size[t];
 	}
-	if (!(l->cell = mem_new(cells, sizeof *l->cell, "element lookup", e)))
-		return -1;
-	for (uint32_t t = 0; t < m->triangles; t++)
-		for (uint32_t k = 0, n = l->size[t]; k < n * n; k++)
-			l->cell[l->first[t] + k] = cell_element(m, t, n, k % n, k / n);
-	return 0;
+	l->cell = mem_new(cells, sizeof *l->cell, "element lookup", e);
+	return l->cell ? fill(l, e) : -1;
 }
 
 void locator_free(struct locator *l)
@@ -71,5 +136,6 @@ void locator_free(struct locator *l)
 	free(l->first);
 	free(l->size);
 	free(l->cell);
+	free(l->node);
 	*l = (struct locator){ 0 };
 }

@@ -4,35 +4,54 @@
 
 #include "model.h"
 
-/* A grid over the (w1, w2) plane of every subdivided triangle: cells that lie
- * inside one element name it, the others send to the tree. */
-struct locator {
-	const struct model *m;
-	uint64_t *first;     /* [triangles] first cell */
-	uint32_t *size;      /* [triangles] cells along an edge, 0 = one element only */
-	uint32_t *cell;      /* element, or UINT32_MAX = ask the tree */
+/* The barycentric weights of a split tree's node as affine functions of the weights
+ * (w1, w2) of the whole triangle: weight c = a[c] + b[c] w1 + d[c] w2. */
+struct locator_node {
+	float a[3], b[3], d[3];
 };
 
-/* O(elements). m must outlive it. 0, or -1 and e. */
+/* A grid over the (w1, w2) plane of every subdivided triangle: a cell names the
+ * element that holds it, or the deepest node of the split tree that does. */
+struct locator {
+	const struct model *m;
+	uint64_t *first;             /* [triangles] first cell */
+	uint32_t *size;              /* [triangles] cells along an edge, 0 = one element */
+	int32_t *cell;               /* a split, or ~element */
+	struct locator_node *node;   /* [splits] */
+};
+
+/* O(elements log elements). m must outlive it. 0, or -1 and e. */
 int locator_init(struct locator *l, const struct model *m, struct err *e);
 void locator_free(struct locator *l);
 
-/* The element that model_locate finds. */
+/* The element that model_locate finds (its neighbour, within float32 rounding of
+ * their common edge). */
 static inline uint32_t locate(const struct locator *l, uint32_t tri, const double w[3])
 {
 	uint32_t n = l->size[tri];
 
 	if (n == 0)
 		return (uint32_t)~l->m->triangle_split[tri];
-	double x = w[1] * n, y = w[2] * n;
-	uint32_t i = x > 0 ? (uint32_t)x : 0, j = y > 0 ? (uint32_t)y : 0;
-	i = i < n ? i : n - 1;
-	j = j < n ? j : n - 1;
-	uint32_t element = l->cell[l->first[tri] + (uint64_t)j * n + i];
-	if (element != UINT32_MAX)
-		return element;
-	double copy[3] = { w[0], w[1], w[2] };
-	return model_locate(l->m, tri, copy);
+	float x = (float)w[1], y = (float)w[2];
+	int32_t i = (int32_t)(x * (float)n), j = (int32_t)(y * (float)n), last = (int32_t)n - 1;
+	i = i < 0 ? 0 : i < last ? i : last;
+	j = j < 0 ? 0 : j < last ? j : last;
+	int32_t at = l->cell[l->first[tri] + (uint64_t)j * n + (uint64_t)i];
+	if (at < 0)
+		return (uint32_t)~at;
+	const struct locator_node *node = &l->node[at];
+	float v[3];
+	for (int c = 0; c < 3; c++)
+		v[c] = node->a[c] + node->b[c] * x + node->d[c] * y;
+	while (at >= 0) {
+		const struct split *s = &l->m->split[at];
+		int a = s->edge, b = a == 2 ? 0 : a + 1, second = v[a] < v[b];
+		float low = second ? v[a] : v[b], high = second ? v[b] : v[a];
+		v[second ? b : a] = high - low;
+		v[second ? a : b] = 2 * low;
+		at = s->child[second];
+	}
+	return (uint32_t)~at;
 }
 
 #endif
