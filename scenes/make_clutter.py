@@ -124,11 +124,11 @@ def sofa(s, m, name, seats, x, z, degrees, cloth):
     soft = Shape()
     for k in range(seats):
         a = -wide / 2 + .7 * k
-        soft.join(cushion((a + .005, .28, -.22), (a + .695, .47, .47), 60, 30))
-        soft.join(cushion((a + .005, .40, -.46), (a + .695, .92, -.20), 60, 30))
+        soft.join(cushion((a + .005, .28, -.22), (a + .695, .47, .47), 44, 22))
+        soft.join(cushion((a + .005, .40, -.46), (a + .695, .92, -.20), 44, 22))
     for side in (-1, 1):
         a = side * (wide / 2 + .1)
-        soft.join(cushion((a - .1, .28, -.45), (a + .1, .66, .46), 60, 30))
+        soft.join(cushion((a - .1, .28, -.45), (a + .1, .66, .46), 44, 22))
     instance(s, name + " cushions", s.mesh(name + " cushions", soft, m[cloth]), x, 0, z, degrees)
 
 
@@ -152,14 +152,14 @@ def dining(s, m):
         chair.join(post.turned(0, by=(dx, 0, -.19)))
     for k in range(3):
         y = .60 + .12 * k
-        chair.join(cushion((-.2, y, -.205), (.2, y + .05, -.175), 24, 8))
+        chair.join(cushion((-.2, y, -.205), (.2, y + .05, -.175), 20, 8))
     chair_mesh = s.mesh("chair", chair, m["oak"])
-    seat_mesh = s.mesh("chair seat", cushion((-.21, .41, -.21), (.21, .47, .21), 40, 16), m["blue"])
+    seat_mesh = s.mesh("chair seat", cushion((-.21, .41, -.21), (.21, .47, .21), 32, 14), m["blue"])
     plate = s.mesh("plate", Shape().lathe(arc([(0, .006), (.06, .006), (.12, .018), (.122, .015),
                                                (.07, .001), (0, .001)][::-1], 3), 36), m["china"])
     cup = s.mesh("cup", Shape().lathe(arc([(0, .001), (.028, .001), (.038, .05), (.04, .085),
                                            (.036, .085), (.034, .05), (.02, .008), (0, .008)], 3),
-                                      28), m["china"])
+                                      22), m["china"])
     for k, (dx, side) in enumerate([(-.6, 1), (0, 1), (.6, 1), (-.6, -1), (0, -1), (.6, -1)]):
         turn = 180 if side > 0 else 0
         wobble = (7, -5, 11, -9, 4, -13)[k]
@@ -199,7 +199,7 @@ def plants(s, m, rng):
     pot = [(.13, 0), (.16, .14), (.18, .28), (.165, .28), (.15, .22), (0, .22)]
     pot_mesh = s.mesh("pot", Shape().lathe(arc(pot, 4), 40), m["clay"])
     stem_mesh = s.mesh("stem", Shape().lathe([(.012, .21), (.01, .6), (0, 1.0)], 12), m["leaf solid"])
-    kinds = [s.mesh(f"leaves {k}", plant_leaves(rng, 84, .95), m["leaf"]) for k in (1, 2)]
+    kinds = [s.mesh(f"leaves {k}", plant_leaves(rng, 64, .95), m["leaf"]) for k in (1, 2)]
     for k, (x, z, turn) in enumerate([(.5, .78, 20), (7.5, .5, 110), (7.55, 5.5, 200), (.5, 5.5, 300)]):
         instance(s, f"pot {k + 1}", pot_mesh, x, 0, z, turn)
         instance(s, f"stem {k + 1}", stem_mesh, x, 0, z, turn)
@@ -220,7 +220,7 @@ def lounge(s, m):
                                            m["varnish"]), 5.8, lift, 3.0)
     vase = [(.05, 0), (.10, .1), (.09, .2), (.035, .29), (.045, .34), (.038, .34),
             (.028, .29), (.07, .18), (0, .03)]
-    shape = Shape().lathe(arc(vase, 6), 64)
+    shape = Shape().lathe(arc(vase, 5), 48)
     glossy, plain = s.mesh("vase", shape, m["glaze"]), s.mesh("vase", shape, m["clay"])
     instance(s, "vase 1", glossy, 5.95, lift + .42, 2.9)
     instance(s, "vase 2", plain, 3.55, 1.10, .2)
