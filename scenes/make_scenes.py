@@ -265,13 +265,13 @@ def two_pass():
     brick = s.material("brick red", {"rho_d": [.58, .13, .08]})
     teal = s.material("teal", {"rho_d": [.06, .36, .36]})
     ivory = s.material("ivory", {"rho_d": [.80, .77, .68]})
-    day = s.material("ceiling lamp", {"rho_d": .7}, glow=(9, 10.5, 12.5))
-    glow = s.material("lantern", {"rho_d": .6}, glow=(42, 24, 9.5))
+    day = s.material("ceiling lamp", {"rho_d": .7}, glow=(13, 15.5, 19))
+    glow = s.material("lantern", {"rho_d": .6}, glow=(36, 20, 8))
 
     x, y, z = 4, 2.6, 3
     faces = walls(x, y, z)
-    for name, material in [("floor", boards), ("back wall", plain), ("front wall", plain),
-                           ("left wall", lacquer), ("right wall", warm)]:
+    for name, material in [("floor", boards), ("front wall", plain), ("left wall", lacquer),
+                           ("right wall", warm)]:
         s.shape(name, Shape().polygon(*faces[name]), material)
     recessed(s, faces["ceiling"], [(1.2, y, 1.35), (2.6, y, 1.35), (2.6, y, 1.75), (1.2, y, 1.75)],
              plain, day, "ceiling lamp")
@@ -283,17 +283,15 @@ def two_pass():
     s.shape("lantern", Shape().box((3.40, .75, .38), (3.62, 1.05, .60)), glow)
     s.shape("lantern foot", Shape().box((3.46, 0, .44), (3.56, .70, .54), skip="y"), wood)
 
-    # The mirror hangs on the back wall, its frame reaching into the plaster.
-    low, high, deep = (1.15, 1.1), (2.25, 2.15), .03
-    rim = .05
-    face = [(low[0], low[1], deep), (high[0], low[1], deep), (high[0], high[1], deep),
-            (low[0], high[1], deep)]
-    edge = [(low[0] - rim, low[1] - rim), (high[0] + rim, high[1] + rim)]
-    outline = [(edge[0][0], edge[0][1], deep), (edge[1][0], edge[0][1], deep),
-               (edge[1][0], edge[1][1], deep), (edge[0][0], edge[1][1], deep)]
+    # The mirror hangs on the back wall, which is cut out behind it.
+    def panel(x0, y0, x1, y1, z):
+        return [(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)]
+
+    face, rim = panel(1.15, 1.1, 2.25, 2.15, .03), panel(1.1, 1.05, 2.3, 2.2, .03)
+    s.shape("back wall", frame_of(faces["back wall"], panel(1.1, 1.05, 2.3, 2.2, 0)), plain)
     s.shape("wall mirror", Shape().polygon(*face), mirror)
-    s.shape("wall mirror frame", frame_of(outline, face).join(
-        Shape().box((*edge[0], 0), (*edge[1], deep), skip="zZ")), wood)
+    s.shape("wall mirror frame", frame_of(rim, face).join(
+        Shape().box((1.1, 1.05, 0), (2.3, 2.2, .03), skip="zZ")), wood)
 
     # Two panes on a low plinth, with things to see behind them.
     s.shape("plinth", Shape().box((.70, 0, 1.70), (2.14, .08, 1.86), skip="y"), wood)
@@ -301,6 +299,10 @@ def two_pass():
                                           (.74, 1.28, 1.78)), clear)
     s.shape("frosted pane", Shape().polygon((1.44, .08, 1.78), (2.10, .08, 1.78),
                                             (2.10, 1.28, 1.78), (1.44, 1.28, 1.78)), frosted)
+    posts = Shape().box((.70, 1.28, 1.76), (2.14, 1.32, 1.80))
+    for left in (.70, 1.40, 2.10):
+        posts.box((left, .08, 1.76), (left + .04, 1.28, 1.80), skip="yY")
+    s.shape("pane frame", posts, wood)
     tall = Shape().box((-.16, 0, -.16), (.16, .86, .16), skip="y").turned(24, by=(1.16, 0, 1.02))
     s.shape("tall box", tall, brick)
     low_box = Shape().box((-.22, 0, -.20), (.22, .36, .20), skip="y").turned(-17, by=(1.80, 0, 1.12))
@@ -310,7 +312,7 @@ def two_pass():
     s.camera("overview", (2.45, 1.5, 6.1), (1.98, 1.22, 0), 41, 4 / 3)
     s.camera("screen", (1.75, 1.35, 2.75), (3.2, .85, .62), 44, 4 / 3)
     s.camera("glossy", (2.9, 1.45, 2.55), (0, 1.05, .95), 55, 4 / 3)
-    s.camera("mirror", (2.6, 1.55, 2.2), (1.66, 1.6, 0), 48, 4 / 3)
+    s.camera("mirror", (.45, 1.5, 1.05), (1.75, 1.48, 0), 58, 4 / 3)
     s.camera("panes", (1.75, 1.05, 2.95), (1.38, .58, 1.2), 52, 4 / 3)
     return s
 

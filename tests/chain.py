@@ -32,8 +32,8 @@ def run(tool, *arguments, expect=0, seconds=600):
     except subprocess.TimeoutExpired:
         raise Failed(f"{tool} took more than {seconds} s") from None
     if expect is not None and result.returncode != expect:
-        tail = result.stderr.strip().splitlines()[-1:] or ["(no message)"]
-        raise Failed(f"{tool} exited {result.returncode}: {tail[0]}")
+        said = [line for line in result.stderr.splitlines() if not line.startswith("Try ")]
+        raise Failed(f"{tool} exited {result.returncode}: {said[-1] if said else '(no message)'}")
     return result
 
 

@@ -527,7 +527,7 @@ def self_bucket(lab):
                 half.add([c, b, a], [(0, 1, 2)])
         scene.shape(name, half, scene.material(name, lobe))
     scene.write(lab.path(".gltf"))
-    run("mesh", lab.path(".gltf"), "-o", lab.path(".mesh"), "-p", 4, "-e", "inf", "--normal-cone", 90)
+    run("mesh", lab.path(".gltf"), "-o", lab.path(".mesh"), "-p", 4, "-e", "inf", "--normal-cone", 80)
     lab.solve(n=1024)
     emitted, *gone = lab.ledger.values()
     near(float(sum(gone)[0]), float(emitted[0]), 1e-6 * float(emitted[0]), "light conserved")
