@@ -60,7 +60,7 @@ uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, 
 		n -= half;
 	}
 	double before = lo > first ? j->element_cdf[lo - 1] : 0;
-	double r = sqrt(fmin(1, fmax(0, (area - before) / (j->element_cdf[lo] - before))));
+	double r = sqrt(fmin(1, fmax(0, (area - before) * j->element_per_area[lo])));
 	double w[3] = { 1 - r, r * (1 - u1), r * u1 }, inset = j->element_inset[lo];
 	const uint32_t *corner = &m->element[3 * (size_t)lo];
 	for (int c = 0; c < 3; c++)
@@ -88,6 +88,7 @@ static void element_tables(struct ff_job *j)
 		double sum = 0;
 		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++) {
 			double size = sqrt(m->element_area[i]);
+			j->element_per_area[i] = 1 / m->element_area[i];
 			j->element_cdf[i] = sum += m->element_area[i];
 			/* Clear of walls along the edges by a few float32 steps of the
 			 * scene, but never far from where the sample belongs. */
@@ -105,6 +106,7 @@ static int job_arrays(struct ff_job *j, struct err *e)
 
 	j->sobol_points = n < SOBOL_POINTS_MAX ? (uint32_t)n : SOBOL_POINTS_MAX;
 	j->element_cdf = mem_new(elements, sizeof *j->element_cdf, "sampling tables", e);
+	j->element_per_area = mem_new(elements, sizeof *j->element_per_area, "sampling tables", e);
 	j->element_inset = mem_new(elements, sizeof *j->element_inset, "sampling tables", e);
 	j->shoots_diffuse = mem_new(sides, 1, "patch flags", e);
 	j->shoots_lobe = mem_new(sides, 1, "patch flags", e);
@@ -114,7 +116,7 @@ static int job_arrays(struct ff_job *j, struct err *e)
 	j->is_black = mem_new(sides, 1, "patch flags", e);
 	j->is_ideal = mem_new(sides, 1, "patch flags", e);
 	j->sobol = mem_new((size_t)j->sobol_points * FF_DIMS, sizeof *j->sobol, "sample points", e);
-	return j->element_cdf && j->element_inset && j->shoots_diffuse && j->shoots_lobe &&
+	return j->element_cdf && j->element_per_area && j->element_inset && j->shoots_diffuse && j->shoots_lobe &&
 	       j->has_lobe && j->is_source && j->emits && j->is_ideal && j->is_black && j->sobol ? 0 : -1;
 }
 
@@ -139,7 +141,7 @@ static int job_init(struct ff_job *j, const struct model *m, const struct ff_opt
 
 static void job_free(struct ff_job *j)
 {
-	void *array[] = { j->element_cdf, j->element_inset, j->shoots_diffuse, j->shoots_lobe,
+	void *array[] = { j->element_cdf, j->element_per_area, j->element_inset, j->shoots_diffuse, j->shoots_lobe,
 		j->has_lobe, j->is_source, j->emits, j->is_ideal, j->is_black, j->sobol };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)

@@ -22,6 +22,7 @@ struct ff_job {
 	uint8_t *is_black;        /* [2P] not modelled: absorbs */
 	uint8_t *is_ideal;        /* [2P] sends light on along an ideal direction */
 	double *element_cdf;      /* [E] area of the patch's elements up to and with this */
+	double *element_per_area; /* [E] 1 / area */
 	double *element_inset;    /* [E] how far samples keep from the edges, barycentric */
 	uint8_t *shoots_diffuse;  /* [2P] light can leave this side Lambertian */
 	uint8_t *shoots_lobe;     /* [2P] ... by an emission lobe */

@@ -172,6 +172,7 @@ struct batch {
 	struct ray_hit hit[BATCH];
 	uint32_t from[BATCH];      /* element the ray leaves */
 	uint32_t element[BATCH];   /* element it hits */
+	const int32_t *way[BATCH]; /* where the search for it begins */
 };
 
 static void batch_numbers(const struct ff_job *j, const struct scramble *s, uint32_t first,
@@ -207,6 +208,28 @@ static void batch_flights(const struct ff_job *j, uint32_t ps, double exponent, 
 	}
 }
 
+static void batch_cast(const struct ff_job *j, uint32_t n, struct batch *b)
+{
+	static const int32_t nowhere = ~0;
+	const struct locator *l = &j->locator;
+
+	for (uint32_t i = 0; i < n; i++) {
+		const struct ray_hit *hit = &b->hit[i];
+		ray_nearest(j->rays, b->flight[i].org, b->flight[i].dir, &b->hit[i]);
+		b->way[i] = hit->triangle == RAY_MISS ? &nowhere
+		          : l->size[hit->triangle] ? &l->cell[locate_cell(l, hit->triangle, hit->w)]
+		                                   : &j->m->triangle_split[hit->triangle];
+		__builtin_prefetch(b->way[i]);
+	}
+	for (uint32_t i = 0; i < n; i++)
+		if (*b->way[i] >= 0) {
+			__builtin_prefetch(&l->node[*b->way[i]]);
+			__builtin_prefetch(&j->m->split[*b->way[i]]);
+		}
+	for (uint32_t i = 0; i < n; i++)
+		b->element[i] = locate_below(l, *b->way[i], b->hit[i].w);
+}
+
 static void batch_land(struct ff_thread *t, int side, uint32_t n, struct batch *b)
 {
 	struct flight stack[MAX_SPLITS + 3];
@@ -236,10 +259,7 @@ static void cast(struct ff_thread *t, uint32_t ps, uint32_t count, double expone
 			uint32_t n = each - first < BATCH ? each - first : BATCH;
 			batch_numbers(j, &s, first, n, &b);
 			batch_flights(j, ps, exponent, n, &b);
-			for (uint32_t i = 0; i < n; i++)
-				ray_nearest(j->rays, b.flight[i].org, b.flight[i].dir, &b.hit[i]);
-			for (uint32_t i = 0; i < n; i++)
-				b.element[i] = element_of(j, &b.hit[i]);
+			batch_cast(j, n, &b);
 			batch_land(t, (int)(ps & 1), n, &b);
 		}
 		tally_replicate(&t->tally);

@@ -45,7 +45,8 @@ int tally_init(struct tally *t, const struct model *m, const uint8_t *has_lobe, 
 	t->dense = mem_new(2 * m->elements, sizeof *t->dense, "row tally", e);
 	t->replicate = mem_new(2 * m->patches, sizeof *t->replicate, "row tally", e);
 	t->square = mem_new(2 * m->patches, sizeof *t->square, "row tally", e);
-	t->seen = mem_new(2 * m->patches, 1, "row tally", e);
+	t->words = (2 * m->patches + 63) / 64;
+	t->seen = mem_new(t->words, sizeof *t->seen, "row tally", e);
 	if (!t->dense || !t->replicate || !t->square || !t->seen)
 		return -1;
 	slot_of(t, 0); /* chain 0 is slot 0 of every row */
@@ -54,7 +55,7 @@ int tally_init(struct tally *t, const struct model *m, const uint8_t *has_lobe, 
 
 void tally_free(struct tally *t)
 {
-	void *array[] = { t->dense, t->replicate, t->square, t->seen, t->touched.data,
+	void *array[] = { t->dense, t->replicate, t->square, t->seen,
 		t->far.data, t->sort.data, t->rest.data, t->slot_chain.data,
 		t->chain_slot.data, t->arrival.data };
 
@@ -92,10 +93,7 @@ void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
 	if (chain == 0) {
 		t->dense[element_side] += w;
 		t->replicate[ps] += w;
-		if (!t->seen[ps]) {
-			t->seen[ps] = 1;
-			vec_append(&t->touched, &ps, 1, sizeof ps, &t->err);
-		}
+		t->seen[ps >> 6] |= (uint64_t)1 << (ps & 63);
 	} else {
 		const uint32_t *start = t->m->patch_start;
 		uint64_t place = 2 * (uint64_t)start[p] + (element - start[p]) +
@@ -110,14 +108,14 @@ void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
 
 void tally_replicate(struct tally *t)
 {
-	const uint32_t *touched = t->touched.data;
 	double escape = tally_rest(t, 0)->escape, now = escape - t->escape_before;
 
-	for (size_t i = 0; i < t->touched.n; i++) {
-		double x = t->replicate[touched[i]];
-		t->square[touched[i]] += x * x;
-		t->replicate[touched[i]] = 0;
-	}
+	for (size_t word = 0; word < t->words; word++)
+		for (uint64_t left = t->seen[word]; left; left &= left - 1) {
+			size_t ps = 64 * word + (size_t)__builtin_ctzll(left);
+			t->square[ps] += t->replicate[ps] * t->replicate[ps];
+			t->replicate[ps] = 0;
+		}
 	t->escape_square += now * now;
 	t->escape_before = escape;
 	t->replicates++;
@@ -125,21 +123,20 @@ void tally_replicate(struct tally *t)
 
 /* ---- finishing a row ---- */
 
-static int by_number(const void *a, const void *b)
+/* Room for n more entries. */
+static int reserve(struct ff_batch *b, size_t n, struct err *e)
 {
-	uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-	return (x > y) - (x < y);
+	return vec_reserve(&b->column, n, sizeof(uint32_t), e) ||
+	       vec_reserve(&b->value, n, b->f64 ? sizeof(double) : sizeof(float), e) ? -1 : 0;
 }
 
-static int put_value(struct ff_batch *b, uint32_t column, double w, double *sum, struct err *e)
+/* Appends an entry into reserved room; returns its value as it is stored. */
+static double put_value(struct ff_batch *b, uint32_t column, double w)
 {
-	float f = (float)w;
-
-	*sum += b->f64 ? w : (double)f;
-	if (vec_append(&b->column, &column, 1, sizeof column, e))
-		return -1;
-	return b->f64 ? vec_append(&b->value, &w, 1, sizeof w, e)
-	              : vec_append(&b->value, &f, 1, sizeof f, e);
+	((uint32_t *)b->column.data)[b->column.n++] = column;
+	if (b->f64)
+		return ((double *)b->value.data)[b->value.n++] = w;
+	return (double)(((float *)b->value.data)[b->value.n++] = (float)w);
 }
 
 /* Variance of one receiver's share of the row from its replicates, or, where
@@ -154,27 +151,36 @@ static double share_variance(const struct tally *t, double sum, double square, d
 	return f * (1 - f) / samples;
 }
 
-/* Chain 0: scans the elements of the patch-sides that were hit. Clears them. */
+/* Chain 0 on one patch-side: entries for the elements that were hit. Clears them. */
+static int finish_side(struct tally *t, struct ff_batch *b, uint32_t ps, uint32_t samples,
+                       double total, double *sum, double *variance, struct err *e)
+{
+	const uint32_t *start = &t->m->patch_start[ps >> 1];
+	double patch_sum = 0;
+
+	if (reserve(b, start[1] - start[0], e))
+		return -1;
+	for (uint32_t el = start[0]; el < start[1]; el++) {
+		double *w = &t->dense[2 * (size_t)el + (ps & 1)];
+		if (*w > 0)
+			*sum += put_value(b, 2 * el + (ps & 1), *w);
+		patch_sum += *w;
+		*w = 0;
+	}
+	*variance += share_variance(t, patch_sum, t->square[ps], total, samples);
+	t->square[ps] = t->replicate[ps] = 0;
+	return 0;
+}
+
 static int finish_near(struct tally *t, struct ff_batch *b, uint32_t samples, double total,
                        double *sum, double *variance, struct err *e)
 {
-	uint32_t *touched = t->touched.data;
-
-	if (t->touched.n)
-		qsort(touched, t->touched.n, sizeof *touched, by_number);
-	for (size_t i = 0; i < t->touched.n; i++) {
-		uint32_t ps = touched[i], p = ps >> 1;
-		double patch_sum = 0;
-		for (uint32_t el = t->m->patch_start[p]; el < t->m->patch_start[p + 1]; el++) {
-			double *w = &t->dense[2 * (size_t)el + (ps & 1)];
-			if (*w > 0 && put_value(b, 2 * el + (ps & 1), *w, sum, e))
+	for (size_t word = 0; word < t->words; word++) {
+		for (uint64_t left = t->seen[word]; left; left &= left - 1)
+			if (finish_side(t, b, (uint32_t)(64 * word) + (uint32_t)__builtin_ctzll(left),
+			                samples, total, sum, variance, e))
 				return -1;
-			patch_sum += *w;
-			*w = 0;
-		}
-		*variance += share_variance(t, patch_sum, t->square[ps], total, samples);
-		t->square[ps] = t->replicate[ps] = 0;
-		t->seen[ps] = 0;
+		t->seen[word] = 0;
 	}
 	return 0;
 }
@@ -314,7 +320,6 @@ static int finish_far(struct tally *t, struct ff_batch *b, struct err *e)
 	for (size_t k = 1; !bad && k < slots; k++) {
 		uint64_t begin = order[k].slot * (uint64_t)total, end = begin + total;
 		size_t i = 0, hi = t->far.n;
-		double sum = 0;
 		while (i < hi) {
 			size_t mid = i + (hi - i) / 2;
 			if (f[mid].key < begin)
@@ -328,7 +333,9 @@ static int finish_far(struct tally *t, struct ff_batch *b, struct err *e)
 			double w = 0;
 			for (; i < t->far.n && f[i].key == key; i++)
 				w += f[i].w;
-			bad = put_value(b, column, w, &sum, e);
+			bad = reserve(b, 1, e);
+			if (!bad)
+				put_value(b, column, w);
 		}
 		bad = bad || put_block(t, b, order[k].slot, e);
 	}
@@ -342,7 +349,7 @@ static void clear(struct tally *t)
 
 	for (size_t s = 0; s < t->slot_chain.n; s++)
 		((uint32_t *)t->chain_slot.data)[chain[s]] = 0;
-	t->slot_chain.n = t->rest.n = t->far.n = t->arrival.n = t->touched.n = 0;
+	t->slot_chain.n = t->rest.n = t->far.n = t->arrival.n = 0;
 	t->escape_before = t->escape_square = 0;
 	t->replicates = 0;
 	slot_of(t, 0);

@@ -21,8 +21,8 @@ struct tally {
 	double *dense;             /* [2E] chain 0 */
 	double *replicate;         /* [2P] chain 0, the current replicate */
 	double *square;            /* [2P] sums of squares over replicates */
-	uint8_t *seen;             /* [2P] */
-	struct vec touched;        /* uint32_t patch-sides seen in chain 0 */
+	uint64_t *seen;            /* [words] bits of patch-sides seen in chain 0 */
+	size_t words;
 	double escape_before, escape_square;
 	int replicates;
 

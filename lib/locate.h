@@ -24,23 +24,27 @@ struct locator {
 int locator_init(struct locator *l, const struct model *m, struct err *e);
 void locator_free(struct locator *l);
 
-/* The element that model_locate finds (its neighbour, within float32 rounding of
- * their common edge). */
-static inline uint32_t locate(const struct locator *l, uint32_t tri, const double w[3])
+/* The element that model_locate finds (its neighbour, within float32 rounding of their
+ * common edge), in three steps, so that a loop over many hits can ask for the memory of
+ * each step ahead: the cell of a hit (subdivided triangles only), what it names, and
+ * the way down from there. */
+static inline uint64_t locate_cell(const struct locator *l, uint32_t tri, const double w[3])
 {
 	uint32_t n = l->size[tri];
-
-	if (n == 0)
-		return (uint32_t)~l->m->triangle_split[tri];
 	float x = (float)w[1], y = (float)w[2];
 	int32_t i = (int32_t)(x * (float)n), j = (int32_t)(y * (float)n), last = (int32_t)n - 1;
+
 	i = i < 0 ? 0 : i < last ? i : last;
 	j = j < 0 ? 0 : j < last ? j : last;
-	int32_t at = l->cell[l->first[tri] + (uint64_t)j * n + (uint64_t)i];
+	return l->first[tri] + (uint64_t)j * n + (uint64_t)i;
+}
+
+static inline uint32_t locate_below(const struct locator *l, int32_t at, const double w[3])
+{
 	if (at < 0)
 		return (uint32_t)~at;
 	const struct locator_node *node = &l->node[at];
-	float v[3];
+	float x = (float)w[1], y = (float)w[2], v[3];
 	for (int c = 0; c < 3; c++)
 		v[c] = node->a[c] + node->b[c] * x + node->d[c] * y;
 	while (at >= 0) {
@@ -52,6 +56,13 @@ static inline uint32_t locate(const struct locator *l, uint32_t tri, const doubl
 		at = s->child[second];
 	}
 	return (uint32_t)~at;
+}
+
+static inline uint32_t locate(const struct locator *l, uint32_t tri, const double w[3])
+{
+	int32_t at = l->size[tri] ? l->cell[locate_cell(l, tri, w)] : l->m->triangle_split[tri];
+
+	return locate_below(l, at, w);
 }
 
 #endif
