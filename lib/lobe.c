@@ -119,35 +119,11 @@ double lobe_albedo(double k, double cos_theta)
 	       albedo_piece(k, c, s, second, end);
 }
 
-/* Cosine and sine of phi in [0, 2 pi) to rounding, by Taylor series at the half angle,
- * without branches: directions are sampled by the hundred million. */
-static void turn(double phi, double *x, double *y)
-{
-	static const double odd[10] = { 1, -1. / 6, 1. / 120, -1. / 5040, 1. / 362880,
-		-1. / 39916800, 1. / 6227020800, -1. / 1307674368e3, 1. / 355687428096e3,
-		-1. / 121645100408832e3 };
-	static const double even[11] = { 1, -1. / 2, 1. / 24, -1. / 720, 1. / 40320,
-		-1. / 3628800, 1. / 479001600, -1. / 87178291200, 1. / 20922789888e3,
-		-1. / 6402373705728e3, 1. / 2432902008176640e3 };
-	double h = phi / 2 - pi / 2, q = h * h; /* |h| <= pi / 2 */
-	double s = odd[9], c = even[10];
-
-	for (int i = 8; i >= 0; i--)
-		s = s * q + odd[i];
-	for (int i = 9; i >= 0; i--)
-		c = c * q + even[i];
-	s *= h;
-	/* phi = 2 h + pi */
-	*x = 2 * s * s - 1;
-	*y = -2 * s * c;
-}
-
 static void in_frame(const double axis[3], double sine, double cosine, double phi,
                      double out[3])
 {
-	double t[3], b[3], x, y;
+	double t[3], b[3], x = cos(phi), y = sin(phi);
 
-	turn(phi, &x, &y);
 	v3_frame(axis, t, b);
 	for (int i = 0; i < 3; i++)
 		out[i] = sine * (x * t[i] + y * b[i]) + cosine * axis[i];
