@@ -41,7 +41,7 @@ for file in "$scenes"/*.gltf; do
 	for method in rays hemicube; do
 		name="$scene, $method"
 		rm -f "$T/a.ff" "$T/a.rad"
-		check "$name: ffcalc" ffcalc "$T/a.mesh" -o "$T/a.ff" -m $method -n 64
+		check "$name: ffcalc" ffcalc "$T/a.mesh" -o "$T/a.ff" -m $method -n 32 -p 4 --lobe-rays 256
 		[ -f "$T/a.ff" ] || continue
 		[ $method = rays ] && raw=1e-6 || raw=1e-2
 		check "$name: rows close" rows_close "$T/a.ff" $raw
@@ -55,7 +55,7 @@ done
 
 # After every step, and with a resumed run.
 prepare mesh "$scenes/two-pass.gltf" -o "$T/a.mesh" -p 20% -e 20%
-prepare ffcalc "$T/a.mesh" -o "$T/a.ff" -m rays -n 64
+prepare ffcalc "$T/a.mesh" -o "$T/a.ff" -m rays -n 64 --lobe-rays 256
 for steps in 1 2 3 5 8 13 50 200; do
 	rm -f "$T/a.rad"
 	prepare shoot "$T/a.mesh" "$T/a.ff" -o "$T/a.rad" -n $steps -e 1e-6

@@ -7,9 +7,9 @@
 chain() {
 	mkdir -p "$1" &&
 	mesh "$scenes/$3.gltf" -o "$1/a.mesh" -p 25% -e 25% -j "$2" &&
-	ffcalc "$1/a.mesh" -o "$1/a.ff" -m "$4" -n 64 -j "$2" &&
-	ffcalc "$1/a.mesh" -o "$1/1.ff" -m "$4" -n 64 --part 1/2 -j "$2" &&
-	ffcalc "$1/a.mesh" -o "$1/f64.ff" -m "$4" -n 64 --precision f64 -j "$2" &&
+	ffcalc "$1/a.mesh" -o "$1/a.ff" -m "$4" -n 32 -p 4 --lobe-rays 256 -j "$2" &&
+	ffcalc "$1/a.mesh" -o "$1/1.ff" -m "$4" -n 32 -p 4 --lobe-rays 256 --part 1/2 -j "$2" &&
+	ffcalc "$1/a.mesh" -o "$1/f64.ff" -m "$4" -n 32 -p 4 --lobe-rays 256 --precision f64 -j "$2" &&
 	shoot "$1/a.mesh" "$1/a.ff" -o "$1/a.rad" -e 1e-3 -j "$2" &&
 	trace "$1/a.rad" -c "$5" -o "$1/a.exr" -s 60x45 --samples 2 -j "$2" &&
 	trace "$1/a.rad" -c "$5" -o "$1/lobes.exr" -s 60x45 --samples 2 --lobe-samples 4 -j "$2" &&
