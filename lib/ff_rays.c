@@ -50,7 +50,10 @@ static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_
 	if (chain == CHAIN_NONE)
 		return 0;
 	if (in->passed >= t->job->o.depth) {
-		tally_rest(&t->tally, chain)->cut += w;
+		/* A chain that leads back to itself is summed as a series, of which the
+		 * passes so far are sample enough; any other ends here. */
+		if (chain != in->chain)
+			tally_rest(&t->tally, chain)->cut += w;
 		return 0;
 	}
 	ff_normal(t->job, element, transmitted ? !hit->side : hit->side, n);
