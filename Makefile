@@ -95,7 +95,7 @@ CHECKS := $(sort $(wildcard tests/tools/*.t tests/tools/*.py))
 check: deps
 	@$(MAKE) --no-print-directory -j2 all unit
 	@$(MAKE) --no-print-directory check-layers check-man
-	@BUILD=$(abspath $(BUILD)) PYTHON=$(PYTHON) tests/run.pl $(UNIT_TESTS) $(CHECKS)
+	@BUILD=$(abspath $(BUILD)) PYTHON=$(PYTHON) tests/run.pl -j 2 $(UNIT_TESTS) $(CHECKS)
 
 # Arrows point down only: tools -> formats -> lib, and lib knows no files.
 check-layers:

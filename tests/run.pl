@@ -23,6 +23,7 @@ my $harness = TAP::Harness->new({
 });
 my $all = $harness->runtests(@ARGV);
 my $broken = grep { $_->has_problems && !$_->failed } map { $all->{parser_for}{$_} } @ARGV;
-my $failed = $all->failed + $broken;
-printf "%d passed, %d failed, %d skipped\n", $all->passed - $all->skipped, $failed, $all->skipped;
+my $failed = scalar($all->failed) + $broken;
+my ($passed, $skipped) = (scalar $all->passed, scalar $all->skipped);
+printf "%d passed, %d failed, %d skipped\n", $passed - $skipped, $failed, $skipped;
 exit($failed || !$all->all_passed ? 1 : 0);
