@@ -18,8 +18,14 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 from chain import TOP, Failed, picture, run
 
 SCENES = {"cornell": ("classic", "256x256"), "two-pass": ("overview", "320x240")}
-SETTINGS = [("default", []), ("`ffcalc -n 1024`", ["-n", 1024]),
-            ("`ffcalc -n 16384`", ["-n", 16384]), ("`ffcalc -m hemicube`", ["-m", "hemicube"])]
+FINE = ["-n", 16384]
+SETTINGS = [  # name, options of mesh, ffcalc and trace
+    ("default", [], [], []),
+    ("`trace --samples 16 --lobe-samples 4`", [], [], ["--samples", 16, "--lobe-samples", 4]),
+    ("`ffcalc -n 1024`", [], ["-n", 1024], []),
+    ("`ffcalc -n 16384`", [], FINE, []),
+    ("`mesh -e 2%`, `ffcalc -n 16384`", ["-e", "2%"], FINE, []),
+    ("`ffcalc -m hemicube`", [], ["-m", "hemicube"], [])]
 STAGES = ("mesh", "ffcalc", "shoot", "first view", "further view")
 
 
@@ -38,42 +44,42 @@ class Scene:
         self.name, self.work = name, os.path.join(work, name)
         self.camera, self.size = SCENES[name]
         os.makedirs(self.work, exist_ok=True)
-        self.gltf = os.path.join(TOP, "scenes", name + ".gltf")
+        self.gltf = shutil.copy(os.path.join(TOP, "scenes", name + ".gltf"), self.work)
         with open(self.gltf) as f:
             self.views = sum("camera" in node for node in json.load(f)["nodes"])
         run("mesh", self.gltf, "-o", self.path("mesh"))
         self.exact = [self.path(f"reference{seed}.exr") for seed in (1, 2)]
         self.exact_seconds = sum(
-            timed("reference", self.path("mesh"), "-c", self.camera, "-s", self.size, "--seed", i + 1,
-                  "--samples", samples // 2, "--compression", "none", "-o", e)
+            timed("reference", self.path("mesh"), "-c", self.camera, "-s", self.size,
+                  "--seed", i + 1, "--samples", samples // 2, "--compression", "none", "-o", e)
             for i, e in enumerate(self.exact))
 
     def path(self, extension):
         return os.path.join(self.work, f"{self.name}.{extension}")
 
-    def render(self, where, *cameras, layers=()):
-        """All these cameras anew into directory `where`."""
+    def render(self, where, camera, options):
+        """A camera, or all, anew into directory `where`."""
         directory = os.path.join(self.work, where)
         shutil.rmtree(directory, ignore_errors=True)
         os.makedirs(directory)
-        return timed("trace", self.path("rad"), *[w for c in cameras for w in ("-c", c)], "-s",
-                     self.size, "--compression", "none", *layers, "-o", directory + "/%s.exr")
+        return timed("trace", self.path("rad"), "-c", camera, "-s", self.size, *options,
+                     "--compression", "none", "-o", directory + "/%s.exr")
 
-    def chain(self, options):
+    def chain(self, mesh, ffcalc, trace):
         """Elapsed and processor seconds of each stage, everything made anew."""
         for extension in ("mesh", "ff", "rad"):
             if os.path.exists(self.path(extension)):
                 os.remove(self.path(extension))
-        spent = [timed("mesh", self.gltf, "-o", self.path("mesh")),
-                 timed("ffcalc", *options, self.path("mesh"), "-o", self.path("ff")),
+        spent = [timed("mesh", *mesh, self.gltf, "-o", self.path("mesh")),
+                 timed("ffcalc", *ffcalc, self.path("mesh"), "-o", self.path("ff")),
                  timed("shoot", self.path("mesh"), self.path("ff"), "-o", self.path("rad")),
-                 self.render("first", self.camera)]
-        further = self.render("all", "all") - spent[-1]
+                 self.render("first", self.camera, trace)]
+        further = self.render("all", "all", trace) - spent[-1]
         return spent + [further / (self.views - 1)]
 
     def sees_lamp(self):
         """The pixels that an emitter touches."""
-        self.render("lamp", self.camera, layers=("--samples", 64, "--layers", "emission"))
+        self.render("lamp", self.camera, ("--samples", 64, "--layers", "emission"))
         lamp = picture(os.path.join(self.work, "lamp", self.camera + ".exr"))
         return sum(lamp["emission." + c] for c in "RGB") > 0
 
@@ -95,8 +101,8 @@ def seconds(pair):
     return " / ".join(f"{max(0, s):.2f}" if s < 10 else f"{s:.0f}" for s in pair)
 
 
-def row(scene, setting, options, repeat):
-    runs = [scene.chain(options) for _ in range(repeat)]
+def row(scene, setting, mesh, ffcalc, trace, repeat):
+    runs = [scene.chain(mesh, ffcalc, trace) for _ in range(repeat)]
     spent = [[statistics.median(r[i][k] for r in runs) for k in (0, 1)] for i in range(len(STAGES))]
     whole, own, bias = scene.errors()
     return [scene.name, setting, *map(seconds, spent), f"{100 * whole:.1f} %", f"{100 * own:.1f} %",
@@ -119,9 +125,11 @@ def line(cells):
 
 def main():
     p = argparse.ArgumentParser(description=__doc__)
-    p.add_argument("--samples", type=int, default=1024, help="paths a pixel of the yardstick, in two halves")
+    p.add_argument("--samples", type=int, default=1024,
+                   help="paths a pixel of the yardstick, in two halves")
     p.add_argument("--repeat", type=int, default=3, help="runs whose median is printed")
-    p.add_argument("--defaults-only", action="store_true", help="leave out the other settings")
+    p.add_argument("--defaults-only", action="store_true",
+                   help="leave out the other settings")
     p.add_argument("--work", help="keep all files here (default: a temporary directory)")
     p.add_argument("scene", nargs="*", help="cornell, two-pass (default: both)")
     o = p.parse_args()
@@ -134,8 +142,8 @@ def main():
             scene = Scene(name, work, o.samples)
             yardsticks.append(f"{name} {scene.camera} {scene.size}, {o.samples} paths a pixel, "
                               f"{seconds(scene.exact_seconds)} s")
-            for setting, options in SETTINGS[:1] if o.defaults_only else SETTINGS:
-                line(row(scene, setting, options, o.repeat))
+            for setting in SETTINGS[:1] if o.defaults_only else SETTINGS:
+                line(row(scene, *setting, o.repeat))
         print("\nSeconds are elapsed / processor time, medians of "
               f"{o.repeat}.\nYardstick: " + "; ".join(yardsticks) + ".")
         print(f"Machine: {machine()}, load at the end {os.getloadavg()[0]:.1f}.")
