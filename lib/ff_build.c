@@ -8,7 +8,7 @@
 #include "ff_job.h"
 #include "vec3.h"
 
-enum { PATCHES_AT_A_TIME = 128, SOBOL_POINTS_MAX = 1 << 16 };
+enum { PATCHES_AT_A_TIME = 64, SOBOL_POINTS_MAX = 1 << 16 };
 
 /* ---- what leaves which side ---- */
 
@@ -120,6 +120,42 @@ static int job_arrays(struct ff_job *j, struct err *e)
 	       j->has_lobe && j->is_source && j->emits && j->is_ideal && j->is_black && j->sobol ? 0 : -1;
 }
 
+/* Bits of x spread to the even places. */
+static uint64_t spread(uint32_t x)
+{
+	uint64_t v = x;
+
+	v = (v | v << 16) & 0x0000ffff0000ffffu;
+	v = (v | v << 8) & 0x00ff00ff00ff00ffu;
+	v = (v | v << 4) & 0x0f0f0f0f0f0f0f0fu;
+	v = (v | v << 2) & 0x3333333333333333u;
+	return (v | v << 1) & 0x5555555555555555u;
+}
+
+static int by_direction(const void *a, const void *b)
+{
+	const uint32_t *x = a, *y = b;
+	uint64_t p = spread(rng_reverse_bits(x[2])) << 1 | spread(rng_reverse_bits(x[3]));
+	uint64_t q = spread(rng_reverse_bits(y[2])) << 1 | spread(rng_reverse_bits(y[3]));
+
+	return (p > q) - (p < q);
+}
+
+/* The sample points, each aligned block of a power of two in an order in which
+ * neighbours have similar directions (their places on a Morton curve, which scrambling
+ * keeps): rays and memory then see coherent work. A replicate is whole blocks. */
+static void fill_samples(struct ff_job *j)
+{
+	uint32_t each = j->o.rays / FF_REPLICATES, block = each & (~each + 1);
+
+	for (uint32_t i = 0; i < j->sobol_points; i++)
+		for (int d = 0; d < FF_DIMS; d++)
+			j->sobol[(size_t)i * FF_DIMS + (size_t)d] = rng_sobol_bits(i, d);
+	for (uint32_t i = 0; j->o.method == FF_RAYS && block && i + block <= j->sobol_points;
+	     i += block)
+		qsort(j->sobol + (size_t)i * FF_DIMS, block, FF_DIMS * sizeof *j->sobol, by_direction);
+}
+
 static int job_init(struct ff_job *j, const struct model *m, const struct ff_options *o,
                     struct err *e)
 {
@@ -130,9 +166,7 @@ static int job_init(struct ff_job *j, const struct model *m, const struct ff_opt
 	if (o->method == FF_HEMICUBE && (hemi_grid_init(&j->grid, (int)o->rays, e) ||
 	                                 !(j->cubes = hemi_scene_new(m, e))))
 		return -1;
-	for (uint32_t i = 0; i < j->sobol_points; i++)
-		for (int d = 0; d < FF_DIMS; d++)
-			j->sobol[(size_t)i * FF_DIMS + (size_t)d] = rng_sobol_bits(i, d);
+	fill_samples(j);
 	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
 		side_flags(j, ps);
 	element_tables(j);
