@@ -56,7 +56,9 @@ int chains_init(struct chains *c, const struct model *m, struct err *e)
 	}
 	set_most(c, &m->material);
 	uint32_t *none = mem_new(c->events, sizeof *none, "chains", e);
-	int bad = !none || rehash(c, 64, e) || chains_find(c, none, e) == CHAIN_NONE;
+	/* Rows of no events must have an address too. */
+	int bad = !none || vec_reserve(&c->count, 1, sizeof *none, e) ||
+	          vec_reserve(&c->child, 1, sizeof *none, e) || rehash(c, 64, e) || chains_find(c, none, e) == CHAIN_NONE;
 	free(none);
 	return bad ? -1 : 0;
 }
