@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""Turns a scene of tests/data/global_illumination.json into glTF:
-oracle2gltf.py ID OUT.gltf, or oracle2gltf.py --list.
+"""Turns a scene of tests/data/global_illumination.json, or the Cornell box at one
+wavelength (tests/data/cornell_box.json), into glTF: oracle2gltf.py ID OUT.gltf, or
+oracle2gltf.py --list.
 
 Each face becomes a node of its own name; rectangles keep their float64 corners (a
 unit square under a matrix), other polygons are rounded to float32. An exitance E
@@ -17,13 +18,51 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "scenes"))
 from gltf_writer import Scene, Shape
 
-DATA = os.path.join(os.path.dirname(os.path.abspath(__file__)), "data", "global_illumination.json")
+DATA = os.path.join(os.path.dirname(os.path.abspath(__file__)), "data")
 KEYS = ("rho_d", "tau_d", "rho_s", "tau_s")
 
 
 def oracles():
-    with open(DATA, encoding="utf-8") as f:
-        return {o["id"]: o for o in json.load(f)["oracles"]}
+    """All scenes by id."""
+    with open(os.path.join(DATA, "global_illumination.json"), encoding="utf-8") as f:
+        known = {o["id"]: o for o in json.load(f)["oracles"]}
+    with open(os.path.join(DATA, "cornell_box.json"), encoding="utf-8") as f:
+        box = json.load(f)
+    for wavelength in box["reference_mean_irradiance_per_unit_light_exitance"]:
+        known["cornell_" + wavelength] = cornell(box, wavelength)
+    return known
+
+
+def cornell(box, wavelength):
+    """The Cornell box at one wavelength, its lamp of exitance 1, in metres: the left
+    wall split along its diagonal, the ceiling cut around the lamp."""
+    at = box["wavelengths_nm"].index(int(wavelength))
+    materials = {name: {"front": {"rho_d": values[at]}, "back": {}}
+                 for name, values in box["reflectance"].items()}
+    materials["light"] = {"front": {"rho_d": box["light_reflectance"], "E": 1.0}, "back": {}}
+    corners = {f["name"]: np.array(f["verts"]) / 1000 for f in box["faces"]}
+    faces = []
+    for f in box["faces"]:
+        v = corners[f["name"]]
+        parts = [v]
+        if f["name"] == "left":
+            parts = [v[[0, 1, 2]], v[[0, 2, 3]]]
+        elif f["name"] == "ceiling":
+            hole = corners["light"]
+            parts = [np.array([v[i], v[(i + 1) % 4], hole[(i + 1) % 4], hole[i]]) for i in range(4)]
+        faces += [{"name": f"{f['name']} {i}", "mat": f["mat"], "verts": part.tolist()}
+                  for i, part in enumerate(parts)]
+    lamp = corners["light"]
+    area = np.linalg.norm(np.cross(lamp[1] - lamp[0], lamp[3] - lamp[0]))
+    expect = []
+    for name, answer in box["reference_mean_irradiance_per_unit_light_exitance"][wavelength].items():
+        e = {"quantity": "H", "face": name + " *", "side": "front", "stat": "mean",
+             "value": answer["H"], "rel_tol": .005, "rel_tol_hemicube": .02}
+        if name == "escaped_fraction":
+            e.update(quantity="escaped_flux", face="*", value=answer["H"] * area)
+        expect.append(e)
+    return {"id": "cornell_" + wavelength, "group": "cornell", "materials": materials,
+            "faces": faces, "expect": expect}
 
 
 def unsupported(oracle):
@@ -66,10 +105,10 @@ def is_rectangle(corners):
 
 
 def scene_of(name, materials, faces, cameras=()):
-    """materials: {name: {"front": {E, rho_d, …, n}, "back": {…}}}; faces: name, verts,
+    """materials: {name: {"front": {E, rho_d, …, n}, "back": {…}}}, what is missing 0; faces: name, verts,
     mat; cameras: (name, eye, target, yfov)."""
     s = Scene(name)
-    known = {m: material(s, m, sides["front"], sides.get("back", {}))
+    known = {m: material(s, m, sides["front"], sides["back"])
              for m, sides in materials.items()}
     for face in faces:
         if is_rectangle(face["verts"]):

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""Compares the chain with the exact answers of tests/data/global_illumination.json.
+"""Compares the chain with the exact answers of tests/data/global_illumination.json and
+the Cornell box of tests/data/cornell_box.json at three wavelengths.
 
 oracles.py --named    the eight scenes to start with, both methods, as TAP
 oracles.py --all      every scene, both methods, as a table
@@ -34,17 +35,20 @@ from chain import Failed, Tap, container, picture, run, table
 from oracle2gltf import INSIDE, convert, oracles, unsupported
 
 LOBES = ["--lobe-rays", "262144"]
-# One line a group: patch and element size as fractions of the longest face edge,
-# samples of each method, where shooting stops.
-GROUPS = {
-    #           patch  element  hemicube                      rays              shoot
-    "furnace":  (1/4,  1/4,  ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-12"]),
-    "network":  (1/8,  1/16, ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-9"]),
-    "cie":      (1/8,  1/16, ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-9"]),
-    "specular": (1/8,  1/8,  ["-n", "128", "-p", "64", *LOBES], ["-n", "131072", *LOBES], ["-e", "1e-9"]),
+# One line a class of scenes, which is named by its group or by a pattern: patch and
+# element size as fractions of the longest face edge, samples of each method, where
+# shooting stops. The first pattern that fits counts.
+CLASSES = {
+    #                     patch element hemicube                  rays              shoot
+    "infinite_plates_*": (1/2,  1/4,  ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-9"]),
+    "*sphere*":          (1,    1,    ["-n", "32", "-p", "32"],  ["-n", "2048"], ["-e", "1e-9"]),
+    "furnace":           (1/4,  1/4,  ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-12"]),
+    "network":           (1/8,  1/16, ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-9"]),
+    "cie":               (1/8,  1/16, ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-9"]),
+    "cornell":           (1/32, 1/32, ["-n", "32", "-p", "8"],   ["-n", "2048"], ["-e", "1e-6"]),
+    "specular":          (1/8,  1/8,  ["-n", "128", "-p", "64", *LOBES], ["-n", "131072", *LOBES],
+                          ["-e", "1e-9"]),
 }
-# Other mesh sizes, by name.
-MESHES = {"infinite_plates_*": (1/2, 1/4)}
 PARTICLES = ["--samples", "4000000"]
 VIEW = ["-s", "64x64", "--samples", "1", "--compression", "none"]
 
@@ -147,8 +151,8 @@ def error_of_b(field, rows, oracle):
         sides = ["front", "back"][::1 if field.side[i] == 0 else -1]
         m = mats[field.name[i]]
         other = at.get((field.element[i], 1 - field.side[i]))
-        transmitted = m[sides[1]]["tau_d"] * field.error[other] if other is not None else 0.0
-        out.append(math.hypot(m[sides[0]]["rho_d"] * field.error[i], transmitted))
+        transmitted = m[sides[1]].get("tau_d", 0) * field.error[other] if other is not None else 0.0
+        out.append(math.hypot(m[sides[0]].get("rho_d", 0) * field.error[i], transmitted))
     return np.array(out)
 
 
@@ -253,10 +257,9 @@ def evaluate(oracle, method, folder):
     reason = unsupported(oracle)
     if reason:
         return [Note(oracle["id"], method, reason, False)]
-    patch, element, cube, rays, stop = GROUPS[oracle["group"]]
-    for pattern, sizes in MESHES.items():
-        if fnmatch.fnmatchcase(oracle["id"], pattern):
-            patch, element = sizes
+    patch, element, cube, rays, stop = next(
+        settings for name, settings in CLASSES.items()
+        if name == oracle["group"] or fnmatch.fnmatchcase(oracle["id"], name))
     longest = max(np.linalg.norm(np.subtract(f["verts"][0], f["verts"][i]))
                   for f in oracle["faces"] for i in (1, -1))
     path = lambda suffix: os.path.join(folder, oracle["id"] + suffix)
