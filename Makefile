@@ -61,6 +61,9 @@ $(BUILD)/%.o: %.c
 	@mkdir -p $(@D)
 	$(CC) $(CPPFLAGS) $(CFLAGS) -c -o $@ $<
 
+# Loops written to become vector code.
+$(BUILD)/lib/ff_sample.o: CFLAGS += -O3
+
 # tinygltf and nlohmann's header are not ours to hold to our warnings.
 $(BUILD)/%.o: %.cc
 	@mkdir -p $(@D)

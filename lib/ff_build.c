@@ -45,69 +45,15 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 	                   bsdf_has_lobe(mt, material, !side, 1);
 }
 
-/* ---- points on patches ---- */
-
-uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, double x[3])
-{
-	const struct model *m = j->m;
-	uint32_t first = m->patch_start[patch], lo = first, n = m->patch_start[patch + 1] - first;
-	double area = u0 * j->element_cdf[first + n - 1];
-
-	/* Binary search without branches to mispredict. */
-	while (n > 1) {
-		uint32_t half = n / 2;
-		lo += j->element_cdf[lo + half - 1] <= area ? half : 0;
-		n -= half;
-	}
-	double before = lo > first ? j->element_cdf[lo - 1] : 0;
-	double r = sqrt(fmin(1, fmax(0, (area - before) * j->element_per_area[lo])));
-	double w[3] = { 1 - r, r * (1 - u1), r * u1 }, inset = j->element_inset[lo];
-	const uint32_t *corner = &m->element[3 * (size_t)lo];
-	for (int c = 0; c < 3; c++)
-		w[c] += inset * (1. / 3 - w[c]);
-	for (int k = 0; k < 3; k++)
-		x[k] = w[0] * m->vertex[3 * (size_t)corner[0] + (size_t)k] +
-		       w[1] * m->vertex[3 * (size_t)corner[1] + (size_t)k] +
-		       w[2] * m->vertex[3 * (size_t)corner[2] + (size_t)k];
-	return lo;
-}
-
-void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3])
-{
-	double s = side ? -1 : 1;
-
-	for (int k = 0; k < 3; k++)
-		n[k] = s * j->m->element_normal[3 * (size_t)element + (size_t)k];
-}
-
-static void element_tables(struct ff_job *j)
-{
-	const struct model *m = j->m;
-
-	for (size_t p = 0; p < m->patches; p++) {
-		double sum = 0;
-		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++) {
-			double size = sqrt(m->element_area[i]);
-			j->element_per_area[i] = 1 / m->element_area[i];
-			j->element_cdf[i] = sum += m->element_area[i];
-			/* Clear of walls along the edges by a few float32 steps of the
-			 * scene, but never far from where the sample belongs. */
-			j->element_inset[i] = fmin(.2, 4 * ray_offset(j->rays) / size);
-		}
-	}
-}
-
 /* ---- a job ---- */
 
 static int job_arrays(struct ff_job *j, struct err *e)
 {
-	size_t sides = 2 * j->m->patches, elements = j->m->elements;
+	size_t sides = 2 * j->m->patches;
 	uint64_t n = (uint64_t)j->o.rays * j->o.emitter_gain / FF_REPLICATES;
 
 	j->sobol_points = n < SOBOL_POINTS_MAX ? (uint32_t)n : SOBOL_POINTS_MAX;
-	j->element_cdf = mem_new(elements, sizeof *j->element_cdf, "sampling tables", e);
-	j->element_per_area = mem_new(elements, sizeof *j->element_per_area, "sampling tables", e);
-	j->element_inset = mem_new(elements, sizeof *j->element_inset, "sampling tables", e);
+	j->element = mem_new(j->m->elements, sizeof *j->element, "sampling tables", e);
 	j->shoots_diffuse = mem_new(sides, 1, "patch flags", e);
 	j->shoots_lobe = mem_new(sides, 1, "patch flags", e);
 	j->has_lobe = mem_new(sides, 1, "patch flags", e);
@@ -116,8 +62,8 @@ static int job_arrays(struct ff_job *j, struct err *e)
 	j->is_black = mem_new(sides, 1, "patch flags", e);
 	j->is_ideal = mem_new(sides, 1, "patch flags", e);
 	j->sobol = mem_new((size_t)j->sobol_points * FF_DIMS, sizeof *j->sobol, "sample points", e);
-	return j->element_cdf && j->element_per_area && j->element_inset && j->shoots_diffuse && j->shoots_lobe &&
-	       j->has_lobe && j->is_source && j->emits && j->is_ideal && j->is_black && j->sobol ? 0 : -1;
+	return j->element && j->shoots_diffuse && j->shoots_lobe && j->has_lobe && j->emits &&
+	       j->is_source && j->is_black && j->is_ideal && j->sobol ? 0 : -1;
 }
 
 /* Bits of x spread to the even places. */
@@ -169,14 +115,14 @@ static int job_init(struct ff_job *j, const struct model *m, const struct ff_opt
 	fill_samples(j);
 	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
 		side_flags(j, ps);
-	element_tables(j);
+	ff_element_table(j);
 	return 0;
 }
 
 static void job_free(struct ff_job *j)
 {
-	void *array[] = { j->element_cdf, j->element_per_area, j->element_inset, j->shoots_diffuse, j->shoots_lobe,
-		j->has_lobe, j->is_source, j->emits, j->is_ideal, j->is_black, j->sobol };
+	void *array[] = { j->element, j->shoots_diffuse, j->shoots_lobe, j->has_lobe,
+		j->is_source, j->emits, j->is_ideal, j->is_black, j->sobol };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);

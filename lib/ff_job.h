@@ -11,6 +11,15 @@
 
 enum { FF_REPLICATES = 4, FF_DIMS = 5 };
 
+/* An element as a place to send rays from. */
+struct ff_element {
+	double cdf;               /* area of the patch's elements up to and with this */
+	double per_area;
+	double corner[3], edge[2][3]; /* points are corner + w1 edge[0] + w2 edge[1], with
+	                             weights that keep a little clear of the edges */
+	double tangent[2][3];     /* with the front normal an orthonormal frame */
+};
+
 /* Shared, read-only while rows are computed. */
 struct ff_job {
 	const struct model *m;
@@ -21,9 +30,7 @@ struct ff_job {
 	struct locator locator;
 	uint8_t *is_black;        /* [2P] not modelled: absorbs */
 	uint8_t *is_ideal;        /* [2P] sends light on along an ideal direction */
-	double *element_cdf;      /* [E] area of the patch's elements up to and with this */
-	double *element_per_area; /* [E] 1 / area */
-	double *element_inset;    /* [E] how far samples keep from the edges, barycentric */
+	struct ff_element *element; /* [E] */
 	uint8_t *shoots_diffuse;  /* [2P] light can leave this side Lambertian */
 	uint8_t *shoots_lobe;     /* [2P] ... by an emission lobe */
 	uint8_t *has_lobe;        /* [2P] light arriving here leaves by a finite lobe */
@@ -63,9 +70,30 @@ struct ff_thread {
 	struct vec chain_map;     /* local -> whole */
 };
 
+/* Fills job->element. O(elements). */
+void ff_element_table(struct ff_job *j);
+
 /* A point on a patch, uniform by area, from two numbers in [0,1): its element and
  * position (on the surface, not moved off it). */
 uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, double x[3]);
+
+/* A batch of a row's rays, Lambertian from a patch-side, one array a coordinate. */
+enum { FF_BATCH = 64 };
+
+struct ff_batch_rays {
+	uint32_t element[FF_BATCH];       /* where each begins */
+	double org[3][FF_BATCH];          /* off the surface */
+	double dir[3][FF_BATCH];
+	double u[4][FF_BATCH];            /* the numbers they were made from */
+};
+
+/* Rays first to first + n (n <= FF_BATCH) of a scrambled replicate. */
+void ff_batch_numbers(const struct ff_job *j, const uint32_t seed[4], uint32_t first,
+                      uint32_t n, struct ff_batch_rays *b);
+void ff_batch_origins(const struct ff_job *j, uint32_t patch_side, uint32_t n,
+                      struct ff_batch_rays *b);
+void ff_batch_directions(const struct ff_job *j, uint32_t patch_side, uint32_t n,
+                         struct ff_batch_rays *b);
 
 /* Unit normal of a side of an element. */
 void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3]);

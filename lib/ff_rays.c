@@ -92,7 +92,7 @@ static int reflect(struct ff_thread *t, const struct flight *in, const struct ra
 
 /* Tallies where a flight lands; returns how many go on into next[], which may begin
  * at the flight itself. */
-static int land(struct ff_thread *t, struct flight *f, const struct ray_hit *hit,
+static int land(struct ff_thread *t, const struct flight *f, const struct ray_hit *hit,
                 uint32_t element, struct flight next[2])
 {
 	const struct ff_job *j = t->job;
@@ -167,47 +167,23 @@ static struct scramble scramble(const struct ff_job *j, uint32_t row, uint32_t r
 
 /* Rays are made, cast, located and tallied by the batch: each loop then overlaps the
  * latencies of many rays, where one ray at a time would wait for each in turn. */
-enum { BATCH = 64 };
-
 struct batch {
-	double u[BATCH][4];
-	struct flight flight[BATCH];
-	struct ray_hit hit[BATCH];
-	uint32_t from[BATCH];      /* element the ray leaves */
-	uint32_t element[BATCH];   /* element it hits */
-	const int32_t *way[BATCH]; /* where the search for it begins */
+	struct ff_batch_rays rays;
+	struct ray_hit hit[FF_BATCH];
+	uint32_t element[FF_BATCH];   /* element it hits */
+	const int32_t *way[FF_BATCH]; /* where the search for it begins */
 };
 
-static void batch_numbers(const struct ff_job *j, const struct scramble *s, uint32_t first,
-                          uint32_t n, struct batch *b)
+/* Directions of an emission lobe about the normal instead of Lambertian ones. */
+static void lobe_directions(const struct ff_job *j, uint32_t ps, double exponent, uint32_t n,
+                            struct ff_batch_rays *b)
 {
 	for (uint32_t i = 0; i < n; i++) {
-		uint32_t index = first + i;
-		const uint32_t *bits = &j->sobol[(size_t)(index < j->sobol_points ? index : 0) * FF_DIMS];
-		for (int d = 0; d < 4; d++)
-			b->u[i][d] = rng_scramble(index < j->sobol_points
-			                          ? bits[d] : rng_sobol_bits(index, d), s->seed[d]);
-	}
-}
-
-/* Where the rays begin and go: Lambertian (exponent < 0) or an emission lobe about
- * the normal. */
-static void batch_flights(const struct ff_job *j, uint32_t ps, double exponent, uint32_t n,
-                          struct batch *b)
-{
-	for (uint32_t i = 0; i < n; i++) {
-		struct flight *f = &b->flight[i];
-		double normal[3];
-		b->from[i] = ff_point(j, ps >> 1, b->u[i][0], b->u[i][1], f->org);
-		ff_normal(j, b->from[i], (int)(ps & 1), normal);
-		if (exponent < 0)
-			lobe_sample_cosine(normal, &b->u[i][2], f->dir);
-		else
-			lobe_sample(exponent, normal, normal, &b->u[i][2], f->dir);
-		ray_leave(j->rays, normal, f->org);
-		f->w = 1;
-		f->chain = f->passed = 0;
-		f->splits = 0;
+		double normal[3], dir[3], u[2] = { b->u[2][i], b->u[3][i] };
+		ff_normal(j, b->element[i], (int)(ps & 1), normal);
+		lobe_sample(exponent, normal, normal, u, dir);
+		for (int k = 0; k < 3; k++)
+			b->dir[k][i] = dir[k];
 	}
 }
 
@@ -218,7 +194,12 @@ static void batch_cast(const struct ff_job *j, uint32_t n, struct batch *b)
 
 	for (uint32_t i = 0; i < n; i++) {
 		const struct ray_hit *hit = &b->hit[i];
-		ray_nearest(j->rays, b->flight[i].org, b->flight[i].dir, &b->hit[i]);
+		double org[3], dir[3];
+		for (int k = 0; k < 3; k++) {
+			org[k] = b->rays.org[k][i];
+			dir[k] = b->rays.dir[k][i];
+		}
+		ray_nearest(j->rays, org, dir, &b->hit[i]);
 		b->way[i] = hit->triangle == RAY_MISS ? &nowhere
 		          : l->size[hit->triangle] ? &l->cell[locate_cell(l, hit->triangle, hit->w)]
 		                                   : &j->m->triangle_split[hit->triangle];
@@ -233,23 +214,27 @@ static void batch_cast(const struct ff_job *j, uint32_t n, struct batch *b)
 		b->element[i] = locate_below(l, *b->way[i], b->hit[i].w);
 }
 
-static void batch_land(struct ff_thread *t, int side, uint32_t n, struct batch *b)
+static void batch_land(struct ff_thread *t, int side, uint32_t n, const struct batch *b)
 {
-	struct flight stack[MAX_SPLITS + 3];
+	struct flight stack[MAX_SPLITS + 3], f = { .w = 1 };
 
 	for (uint32_t i = 0; i < n; i++) {
-		struct flight *f = &b->flight[i];
+		for (int k = 0; k < 3; k++) {
+			f.org[k] = b->rays.org[k][i];
+			f.dir[k] = b->rays.dir[k][i];
+		}
 		if (t->capturing) {
 			double normal[3];
-			t->now = (struct capture){ .element = b->from[i] };
-			ff_normal(t->job, b->from[i], side, normal);
-			v3_mad(f->org, -ray_offset(t->job->rays), normal, t->now.x);
-			memcpy(t->now.l, f->dir, sizeof t->now.l);
+			t->now = (struct capture){ .element = b->rays.element[i] };
+			ff_normal(t->job, b->rays.element[i], side, normal);
+			v3_mad(f.org, -ray_offset(t->job->rays), normal, t->now.x);
+			memcpy(t->now.l, f.dir, sizeof t->now.l);
 		}
-		fly(t, stack, land(t, f, &b->hit[i], b->element[i], stack));
+		fly(t, stack, land(t, &f, &b->hit[i], b->element[i], stack));
 	}
 }
 
+/* Casts `count` rays from a patch-side: Lambertian (exponent < 0) or an emission lobe. */
 static void cast(struct ff_thread *t, uint32_t ps, uint32_t count, double exponent)
 {
 	const struct ff_job *j = t->job;
@@ -258,10 +243,14 @@ static void cast(struct ff_thread *t, uint32_t ps, uint32_t count, double expone
 
 	for (uint32_t r = 0; r < FF_REPLICATES; r++) {
 		struct scramble s = scramble(j, 2 * ps + (exponent >= 0), r);
-		for (uint32_t first = 0; first < each; first += BATCH) {
-			uint32_t n = each - first < BATCH ? each - first : BATCH;
-			batch_numbers(j, &s, first, n, &b);
-			batch_flights(j, ps, exponent, n, &b);
+		for (uint32_t first = 0; first < each; first += FF_BATCH) {
+			uint32_t n = each - first < FF_BATCH ? each - first : FF_BATCH;
+			ff_batch_numbers(j, s.seed, first, n, &b.rays);
+			ff_batch_origins(j, ps, n, &b.rays);
+			if (exponent < 0)
+				ff_batch_directions(j, ps, n, &b.rays);
+			else
+				lobe_directions(j, ps, exponent, n, &b.rays);
 			batch_cast(j, n, &b);
 			batch_land(t, (int)(ps & 1), n, &b);
 		}
