@@ -5,7 +5,7 @@
 
 #include "mem.h"
 
-enum { CELLS_AN_ELEMENT = 6, SIZE_MAX_CELLS = 2048 };
+enum { CELLS_AN_ELEMENT = 16, SIZE_MAX_CELLS = 2048 };
 
 /* Cells along an edge of a triangle of k elements: a power of two, so that the
  * bisections' edges fall on cells' edges. The triangle covers half of the square. */
