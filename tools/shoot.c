@@ -47,6 +47,7 @@ struct job {
 	struct solution s;
 	struct radiosity_report report;
 	FILE *log;
+	struct progress progress;   /* by the logarithm of what is unshot */
 	double begun;
 	double prepare_seconds, solve_seconds, gather_seconds;
 };
@@ -190,7 +191,14 @@ static int resume(struct job *j, struct err *e)
 static void log_step(void *arg, const struct radiosity_step *step)
 {
 	struct job *j = arg;
+	double unshot = 0, emitted = 0, all = -log(fmax(j->r->solve.stop, 1e-15));
 
+	for (int k = 0; k < step->bands; k++) {
+		unshot += step->unshot[k];
+		emitted += step->emitted[k];
+	}
+	if (j->progress.fn && unshot > 0 && all > 0)
+		j->progress.fn(j->progress.arg, fmin(all, fmax(0, log(emitted / unshot))), all);
 	if (!j->log)
 		return;
 	fprintf(j->log, "%llu", (unsigned long long)step->shots);
@@ -202,6 +210,7 @@ static void log_step(void *arg, const struct radiosity_step *step)
 static int solve(struct job *j, struct err *e)
 {
 	struct radiosity_hooks hooks = { log_step, j };
+	struct cli_progress bar;
 	double t0 = cli_seconds(), t1, t2;
 
 	if (transport_init(&j->t, &j->m, j->ff, j->name, j->r->shards, j->cli->threads, e))
@@ -213,7 +222,10 @@ static int solve(struct job *j, struct err *e)
 		return -1;
 	}
 	t1 = cli_seconds();
-	if (radiosity_shoot(&j->s, &j->t, &j->r->solve, &hooks, &j->report, e))
+	j->progress = cli_progress_begin(&bar, j->cli, "shooting");
+	int bad = radiosity_shoot(&j->s, &j->t, &j->r->solve, &hooks, &j->report, e);
+	cli_progress_end(&bar);
+	if (bad)
 		return -1;
 	t2 = cli_seconds();
 	if (radiosity_gather(&j->s, &j->t, j->cli->threads, &j->report, e))
