@@ -120,6 +120,10 @@ oracles: all
 bench: all $(BENCHES)
 	BUILD=$(abspath $(BUILD)) sh tests/bench/run.sh
 
+# The README's table of speed against error.
+report-table: all
+	BUILD=$(abspath $(BUILD)) $(PYTHON) tests/bench/report.py
+
 format:
 	clang-format -i lib/*.[ch] formats/*.[ch] formats/*.cc tools/*.c tools/common/*.[ch] tests/unit/*.[ch]
 
@@ -140,6 +144,6 @@ install: all
 clean:
 	rm -rf build build-san out
 
-.PHONY: all unit deps demo check check-layers check-man oracles bench format install clean
+.PHONY: all unit deps demo check check-layers check-man oracles bench report-table format install clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
