@@ -220,3 +220,22 @@ int atomic_file_put(const char *path, const void *data, size_t bytes, struct err
 	}
 	return atomic_file_finish(f, e);
 }
+
+int atomic_file_check(const char *path, struct err *e)
+{
+	const char *slash = strrchr(path, '/');
+	char *directory;
+	int bad = 0;
+
+	if (!slash)
+		return 0;
+	/* With its slash, so that a file in its place is told apart. */
+	size_t n = (size_t)(slash - path) + 1;
+	if (!(directory = mem_new(n + 1, 1, "path", e)))
+		return -1;
+	memcpy(directory, path, n);
+	if (access(directory, W_OK | X_OK))
+		bad = err_set(e, "%s: cannot write there: %s", path, strerror(errno));
+	free(directory);
+	return bad;
+}

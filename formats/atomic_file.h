@@ -8,6 +8,10 @@
 
 struct atomic_file;
 
+/* 0 if the directory of `path` can be written to, else -1 and e: better known before
+ * the work than after. */
+int atomic_file_check(const char *path, struct err *e);
+
 /* Begins `path` ("-" = stdout) in a temporary file of the same directory, with
  * the old file's permissions. A target that is not a regular file is written
  * directly; a symbolic link is followed. NULL and e on failure. */

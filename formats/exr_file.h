@@ -64,4 +64,8 @@ int exr_file_read(const char *path, struct image *im, struct exr_file_info *info
  * 8 bytes per 16 rows. */
 int exr_file_read_info(const char *path, struct exr_file_info *info, struct err *e);
 
+/* 1 if `path` is a picture whose attribute EXR_FILE_KEY is `key`: then the file is
+ * touched (mtime now). */
+int exr_file_up_to_date(const char *path, const char *key);
+
 #endif

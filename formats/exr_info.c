@@ -1,6 +1,8 @@
 /* The attributes of a picture. */
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "../lib/mem.h"
 #include "exr_file.h"
@@ -68,4 +70,19 @@ void exr_file_info_free(struct exr_file_info *i)
 	}
 	free(i->string);
 	*i = (struct exr_file_info){ 0 };
+}
+
+int exr_file_up_to_date(const char *path, const char *key)
+{
+	struct exr_file_info info = { 0 };
+	struct err ignored = { 0 };
+	struct stat st;
+
+	if (strcmp(path, "-") == 0 || stat(path, &st) || !S_ISREG(st.st_mode) ||
+	    exr_file_read_info(path, &info, &ignored))
+		return 0;
+	const char *has = exr_file_info_get(&info, EXR_FILE_KEY);
+	int same = has && strcmp(has, key) == 0;
+	exr_file_info_free(&info);
+	return same && utimensat(AT_FDCWD, path, NULL, 0) == 0;
 }

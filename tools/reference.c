@@ -1,14 +1,10 @@
 /* reference: the yardstick; unbiased pictures and irradiance by Monte Carlo. */
-#include <errno.h>
-#include <fcntl.h>
 #include <getopt.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "../formats/atomic_file.h"
 #include "../formats/cache.h"
@@ -155,41 +151,6 @@ static int read_scene(struct reference *r, struct err *e)
 	if (mesh_file_read(r->mesh, &r->m, &r->info, e))
 		return -1;
 	return r->irradiance ? 0 : choose_view(r, content, e);
-}
-
-/* 1 if the picture is there with the same key; it is then touched. */
-static int up_to_date(const struct reference *r)
-{
-	struct exr_file_info info = { 0 };
-	struct err ignored = { 0 };
-	struct stat st;
-
-	if (r->irradiance || stat(r->output, &st) || !S_ISREG(st.st_mode) ||
-	    exr_file_read_info(r->output, &info, &ignored))
-		return 0;
-	const char *key = exr_file_info_get(&info, EXR_FILE_KEY);
-	int same = key && strcmp(key, r->key) == 0;
-	exr_file_info_free(&info);
-	return same && utimensat(AT_FDCWD, r->output, NULL, 0) == 0;
-}
-
-/* Better now than after the work. */
-static int check_directory(const char *path, struct err *e)
-{
-	const char *slash = strrchr(path, '/');
-	char *directory;
-	int bad = 0;
-
-	if (!slash)
-		return 0;
-	if (!(directory = mem_new((size_t)(slash - path) + 2, 1, "path", e)))
-		return -1;
-	memcpy(directory, path, (size_t)(slash - path) + 1);
-	if (access(directory, W_OK | X_OK))
-		bad = err_set(e, "%s: %s; create its directory or choose another", path,
-		              strerror(errno));
-	free(directory);
-	return bad;
 }
 
 static int prepare(struct reference *r, struct err *e)
@@ -371,11 +332,11 @@ static int run(struct reference *r, int argc, char **argv, struct err *e)
 {
 	if (read_scene(r, e))
 		return -1;
-	if (up_to_date(r)) {
+	if (!r->irradiance && exr_file_up_to_date(r->output, r->key)) {
 		cli_note(&r->cli, "%s: up to date", r->output);
 		return 0;
 	}
-	if (check_directory(r->output, e) || prepare(r, e) ||
+	if (atomic_file_check(r->output, e) || prepare(r, e) ||
 	    (r->irradiance ? make_irradiance(r, e) : make_picture(r, argc, argv, e)))
 		return -1;
 	cli_detail(&r->cli, "peak memory %.0f MB", cli_peak_megabytes());

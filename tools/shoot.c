@@ -7,6 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "../formats/atomic_file.h"
 #include "../formats/digest.h"
 #include "../formats/ff_file.h"
 #include "../formats/history.h"
@@ -319,7 +320,7 @@ static int run(struct job *j, int argc, char **argv, struct err *e)
 	int done;
 
 	j->begun = cli_seconds();
-	if (open_inputs(j, e))
+	if (atomic_file_check(j->r->output, e) || open_inputs(j, e))
 		return -1;
 	j->info.options = options_text(j->r);
 	j->info.history = history_append(j->file[0].info.history, argc, argv, e);

@@ -1,15 +1,12 @@
 /* trace: the view-dependent pass; pictures of a solved scene. */
-#include <errno.h>
-#include <fcntl.h>
 #include <getopt.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
+#include "../formats/atomic_file.h"
 #include "../formats/cache.h"
 #include "../formats/camera_file.h"
 #include "../formats/digest.h"
@@ -291,42 +288,6 @@ static int plan(struct trace *t, struct err *e)
 	return bad ? -1 : list_shots(t, e);
 }
 
-/* 1 if the picture is there with the same key; it is then touched. */
-static int up_to_date(const struct shot *s)
-{
-	struct exr_file_info info = { 0 };
-	struct err ignored = { 0 };
-	struct stat st;
-
-	if (strcmp(s->path, "-") == 0 || stat(s->path, &st) || !S_ISREG(st.st_mode) ||
-	    exr_file_read_info(s->path, &info, &ignored))
-		return 0;
-	const char *key = exr_file_info_get(&info, EXR_FILE_KEY);
-	int same = key && strcmp(key, s->key) == 0;
-	exr_file_info_free(&info);
-	return same && utimensat(AT_FDCWD, s->path, NULL, 0) == 0;
-}
-
-/* Better now than after the work. */
-static int check_directory(const char *path, struct err *e)
-{
-	const char *slash = strrchr(path, '/');
-	char *directory;
-	int bad = 0;
-
-	if (!slash)
-		return 0;
-	/* With its slash, so that a file in its place is told apart. */
-	size_t n = (size_t)(slash - path) + 1;
-	if (!(directory = mem_new(n + 1, 1, "path", e)))
-		return -1;
-	memcpy(directory, path, n);
-	if (access(directory, W_OK | X_OK))
-		bad = err_set(e, "%s: cannot write there: %s", path, strerror(errno));
-	free(directory);
-	return bad;
-}
-
 /* ---- the work ---- */
 
 static int read_scene(struct trace *t, int argc, char **argv, struct err *e)
@@ -431,11 +392,11 @@ static int run(struct trace *t, int argc, char **argv, struct err *e)
 	if (plan(t, e))
 		return -1;
 	for (struct shot *s = t->shot; s < t->shot + t->shots; s++) {
-		s->done = up_to_date(s);
+		s->done = exr_file_up_to_date(s->path, s->key);
 		left += !s->done;
 		if (s->done)
 			cli_note(&t->cli, "%s: up to date", s->path);
-		else if (check_directory(s->path, e))
+		else if (atomic_file_check(s->path, e))
 			return -1;
 	}
 	if (left == 0)
