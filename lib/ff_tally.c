@@ -69,10 +69,9 @@ void tally_free(struct tally *t)
 
 struct tally_rest *tally_rest(struct tally *t, uint32_t chain)
 {
-	static struct tally_rest spill; /* only after running out of memory */
 	uint32_t slot = slot_of(t, chain);
 
-	return slot < t->rest.n ? (struct tally_rest *)t->rest.data + slot : &spill;
+	return slot < t->rest.n ? (struct tally_rest *)t->rest.data + slot : &t->spill;
 }
 
 static void note_arrival(struct tally *t, uint32_t chain, uint32_t target, double w,

@@ -29,6 +29,7 @@ struct tally {
 	struct vec far;            /* struct tally_far: longer chains */
 	struct vec sort;           /* scratch for sorting them */
 	struct vec rest;           /* struct tally_rest by slot */
+	struct tally_rest spill;   /* takes what comes after running out of memory */
 	struct vec slot_chain;     /* uint32_t chain by slot; slot 0 = chain 0 */
 	struct vec chain_slot;     /* uint32_t 1 + slot by chain, 0 = unused */
 	struct vec arrival;        /* struct tally_arrival */
