@@ -10,6 +10,8 @@ struct tally_far {
 	double w;
 };
 
+enum { FAR_MOST = 1 << 20 }; /* landings kept before equal ones are added up */
+
 struct tally_arrival {
 	uint32_t slot, target;
 	double dir[3];     /* towards the source, weighted */
@@ -39,7 +41,7 @@ static uint32_t slot_of(struct tally *t, uint32_t chain)
 
 int tally_init(struct tally *t, const struct model *m, const uint8_t *has_lobe, struct err *e)
 {
-	*t = (struct tally){ .m = m, .has_lobe = has_lobe };
+	*t = (struct tally){ .m = m, .has_lobe = has_lobe, .far_most = FAR_MOST };
 	if (chains_init(&t->chains, m, e))
 		return -1;
 	t->dense = mem_new(2 * m->elements, sizeof *t->dense, "row tally", e);
@@ -66,6 +68,62 @@ void tally_free(struct tally *t)
 }
 
 /* ---- while a row is cast ---- */
+
+/* Least-significant-digit radix sort by key, 11 bits a pass; stable. */
+static int sort_far(struct tally *t, struct err *e)
+{
+	size_t n = t->far.n;
+	uint64_t all = 0;
+
+	t->sort.n = 0;
+	if (vec_reserve(&t->sort, n, sizeof(struct tally_far), e))
+		return -1;
+	struct tally_far *from = t->far.data, *to = t->sort.data;
+	for (size_t i = 0; i < n; i++)
+		all |= from[i].key;
+	for (int shift = 0; shift < 64 && all >> shift; shift += 11) {
+		size_t at[2048] = { 0 }, sum = 0;
+		for (size_t i = 0; i < n; i++)
+			at[from[i].key >> shift & 2047]++;
+		for (int k = 0; k < 2048; k++) {
+			size_t c = at[k];
+			at[k] = sum;
+			sum += c;
+		}
+		for (size_t i = 0; i < n; i++)
+			to[at[from[i].key >> shift & 2047]++] = from[i];
+		struct tally_far *swap = from;
+		from = to;
+		to = swap;
+	}
+	if (from != t->far.data) {
+		struct vec swap = t->far;
+		t->far = t->sort;
+		t->far.n = n;
+		t->sort = swap;
+	}
+	return 0;
+}
+
+/* Sorts and adds up equal places: light that goes round between mirrors lands on the
+ * same elements again and again. */
+static int merge_far(struct tally *t, struct err *e)
+{
+	struct tally_far *f;
+	size_t n = 0;
+
+	if (sort_far(t, e))
+		return -1;
+	f = t->far.data;
+	for (size_t i = 0; i < t->far.n; i++) {
+		if (n && f[n - 1].key == f[i].key)
+			f[n - 1].w += f[i].w;
+		else
+			f[n++] = f[i];
+	}
+	t->far.n = n;
+	return 0;
+}
 
 struct tally_rest *tally_rest(struct tally *t, uint32_t chain)
 {
@@ -100,6 +158,10 @@ void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
 		struct tally_far f = { slot_of(t, chain) * 2 * (uint64_t)t->m->elements + place,
 		                       element_side, w };
 		vec_append(&t->far, &f, 1, sizeof f, &t->err);
+		if (t->far.n >= t->far_most) {
+			merge_far(t, &t->err);
+			t->far_most = t->far.n > FAR_MOST / 2 ? 2 * t->far.n : FAR_MOST;
+		}
 	}
 	if (t->has_lobe[ps])
 		note_arrival(t, chain, ps, w, dir);
@@ -180,42 +242,6 @@ static int finish_near(struct tally *t, struct ff_batch *b, uint32_t samples, do
 			                samples, total, sum, variance, e))
 				return -1;
 		t->seen[word] = 0;
-	}
-	return 0;
-}
-
-/* Least-significant-digit radix sort by key, 11 bits a pass; stable. */
-static int sort_far(struct tally *t, struct err *e)
-{
-	size_t n = t->far.n;
-	uint64_t all = 0;
-
-	t->sort.n = 0;
-	if (vec_reserve(&t->sort, n, sizeof(struct tally_far), e))
-		return -1;
-	struct tally_far *from = t->far.data, *to = t->sort.data;
-	for (size_t i = 0; i < n; i++)
-		all |= from[i].key;
-	for (int shift = 0; shift < 64 && all >> shift; shift += 11) {
-		size_t at[2048] = { 0 }, sum = 0;
-		for (size_t i = 0; i < n; i++)
-			at[from[i].key >> shift & 2047]++;
-		for (int k = 0; k < 2048; k++) {
-			size_t c = at[k];
-			at[k] = sum;
-			sum += c;
-		}
-		for (size_t i = 0; i < n; i++)
-			to[at[from[i].key >> shift & 2047]++] = from[i];
-		struct tally_far *swap = from;
-		from = to;
-		to = swap;
-	}
-	if (from != t->far.data) {
-		struct vec swap = t->far;
-		t->far = t->sort;
-		t->far.n = n;
-		t->sort = swap;
 	}
 	return 0;
 }
@@ -308,7 +334,7 @@ static int finish_far(struct tally *t, struct ff_batch *b, struct err *e)
 	size_t slots = t->rest.n, total = 2 * t->m->elements;
 	struct slot_order *order = mem_new(slots, sizeof *order, "row blocks", e);
 	const struct tally_far *f;
-	int bad = !order || sort_far(t, e);
+	int bad = !order || merge_far(t, e);
 
 	f = t->far.data;
 	for (uint32_t s = 1; !bad && s < slots; s++)
@@ -326,16 +352,9 @@ static int finish_far(struct tally *t, struct ff_batch *b, struct err *e)
 			else
 				hi = mid;
 		}
-		while (!bad && i < t->far.n && f[i].key < end) {
-			uint64_t key = f[i].key;
-			uint32_t column = f[i].column;
-			double w = 0;
-			for (; i < t->far.n && f[i].key == key; i++)
-				w += f[i].w;
-			bad = reserve(b, 1, e);
-			if (!bad)
-				put_value(b, column, w);
-		}
+		for (; !bad && i < t->far.n && f[i].key < end; i++)
+			if (!(bad = reserve(b, 1, e)))
+				put_value(b, f[i].column, f[i].w);
 		bad = bad || put_block(t, b, order[k].slot, e);
 	}
 	free(order);

@@ -27,6 +27,7 @@ struct tally {
 	int replicates;
 
 	struct vec far;            /* struct tally_far: longer chains */
+	size_t far_most;           /* when to add up equal ones */
 	struct vec sort;           /* scratch for sorting them */
 	struct vec rest;           /* struct tally_rest by slot */
 	struct tally_rest spill;   /* takes what comes after running out of memory */
