@@ -13,6 +13,7 @@
 enum {
 	GROUPS = 4,               /* of sample points, whose spread gives the error */
 	CAPTURES = 4096,          /* light paths kept of a directional patch-side */
+	FLIGHTS = 8192,           /* rays of a row that go on from ideal surfaces */
 	EMISSION_SAMPLES = 16384  /* lobe directions a row of an emission lobe */
 };
 
@@ -78,47 +79,86 @@ static void through_pixel(struct ff_thread *t, const struct view *v, uint32_t it
 		tally_hit(&t->tally, 0, item, w, dir);
 }
 
-/* Keeps every CAPTURES-th part of the cosine-weighted hemisphere as a light path:
- * `sum` runs over all views. */
-static void capture_pixel(struct ff_thread *t, uint32_t i, const struct view *v,
-                          uint32_t item, const double dir[3], double w, double *sum)
+/* Counts how often a running sum of weights passes a multiple of 1 / parts. */
+static double passes(double *sum, double w, double parts)
 {
-	double before = floor(*sum * CAPTURES);
+	double before = floor(*sum * parts);
 
 	*sum += w;
-	t->capturing = floor(*sum * CAPTURES) > before;
-	if (!t->capturing)
+	return floor(*sum * parts) - before;
+}
+
+struct gathering {
+	double captured, followed; /* running sums over all views */
+	uint32_t flights;
+};
+
+/* Light that a pixel sends to an ideal surface lands there whole; FLIGHTS rays of equal
+ * weight a row, spread over all such pixels, stand for what goes on from there. */
+static void fly_on(struct ff_thread *t, const struct view *v, int has_lobe,
+                   const double dir[3], double w, struct gathering *g)
+{
+	double n = passes(&g->followed, w, FLIGHTS);
+
+	if (!(n > 0))
+		return;
+	t->capturing = has_lobe && g->flights++ % (FLIGHTS / CAPTURES) == 0;
+	t->capture_weight = FLIGHTS / n;
+	ff_follow_on(t, v->eye, dir, n / FLIGHTS);
+	t->capturing = 0;
+}
+
+/* Keeps every CAPTURES-th part of the cosine-weighted hemisphere as a light path. */
+static void capture_pixel(struct ff_thread *t, uint32_t ps, const struct capture *now, double w,
+                          struct gathering *g)
+{
+	struct capture c = *now;
+
+	c.source = ps;
+	c.w = passes(&g->captured, w, CAPTURES);
+	if (c.w > 0 && t->job->is_source[ps])
+		vec_append(&t->captures, &c, 1, sizeof c, &t->tally.err);
+}
+
+static void gather_pixel(struct ff_thread *t, uint32_t i, uint32_t from, size_t pixel, double w,
+                         struct gathering *g)
+{
+	const struct ff_job *j = t->job;
+	const struct view *v = &t->view[2 * i + (from & 1)];
+	uint32_t item = items(t, i, (int)(from & 1))[pixel];
+	uint32_t ps = item == HEMI_VOID ? 0 : 2 * j->m->element_patch[item >> 1] + (item & 1);
+	double dir[3];
+
+	to_world(v, &j->grid.direction[3 * pixel], dir);
+	if (item == HEMI_VOID) {
+		tally_rest(&t->tally, 0)->escape += w;
+		return;
+	}
+	if (j->is_black[ps]) {
+		tally_rest(&t->tally, 0)->black += w;
+		return;
+	}
+	tally_hit(&t->tally, 0, item, w, dir);
+	if (!j->is_ideal[ps] && !j->has_lobe[from])
 		return;
 	t->now = (struct capture){ .element = v->element, .view = i };
-	t->capture_weight = 1 / w;
 	memcpy(t->now.x, v->eye, sizeof t->now.x);
 	memcpy(t->now.l, dir, sizeof t->now.l);
-	uint32_t ps = item == HEMI_VOID ? 0 : 2 * t->job->m->element_patch[item >> 1] + (item & 1);
-	if (item != HEMI_VOID && !t->job->is_ideal[ps] && t->job->is_source[ps]) {
-		struct capture c = t->now;
-		c.source = ps;
-		c.w = 1;
-		vec_append(&t->captures, &c, 1, sizeof c, &t->tally.err);
-	}
+	if (j->is_ideal[ps])
+		fly_on(t, v, j->has_lobe[from], dir, w, g);
+	else
+		capture_pixel(t, ps, &t->now, w, g);
 }
 
 static void gather(struct ff_thread *t, uint32_t ps)
 {
 	const struct ff_job *j = t->job;
-	int side = (int)(ps & 1);
-	double sum = 0, share = 1. / j->o.points;
+	struct gathering g = { 0 };
+	double share = 1. / j->o.points;
 
 	for (uint32_t i = 0; i < j->o.points; i++) {
-		const struct view *v = &t->view[2 * i + (uint32_t)side];
-		const uint32_t *item = items(t, i, side);
-		for (size_t k = 0; k < j->grid.pixels; k++) {
-			double dir[3], w = share * j->grid.delta[k];
-			to_world(v, &j->grid.direction[3 * k], dir);
-			if (j->has_lobe[ps])
-				capture_pixel(t, i, v, item[k], dir, w, &sum);
-			through_pixel(t, v, item[k], dir, w);
-			t->capturing = 0;
-		}
+		for (size_t k = 0; k < j->grid.pixels; k++)
+			gather_pixel(t, i, ps, k, share * j->grid.delta[k], &g);
 		if ((i + 1) * GROUPS % j->o.points == 0)
 			tally_replicate(&t->tally);
 	}

@@ -103,6 +103,9 @@ void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3]);
 void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], double w,
                uint32_t chain);
 
+/* The same for a ray of chain 0 whose first landing has been tallied already. */
+void ff_follow_on(struct ff_thread *t, const double org[3], const double dir[3], double w);
+
 /* All rows of one patch into the batch. 0, or -1 and e. */
 int ff_patch_rays(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
 int ff_patch_hemicube(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);

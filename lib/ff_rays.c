@@ -12,6 +12,7 @@ struct flight {
 	double org[3], dir[3], w;
 	uint32_t chain;
 	uint32_t passed;   /* ideal surfaces so far */
+	int tallied;       /* its landing is known already */
 	int splits;
 };
 
@@ -66,6 +67,7 @@ static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_
 	out->w = w;
 	out->chain = chain;
 	out->passed = in->passed + 1;
+	out->tallied = 0;
 	return 1;
 }
 
@@ -99,15 +101,18 @@ static int land(struct ff_thread *t, const struct flight *f, const struct ray_hi
 
 	t->rays++;
 	if (hit->triangle == RAY_MISS) {
-		tally_rest(&t->tally, f->chain)->escape += f->w;
+		if (!f->tallied)
+			tally_rest(&t->tally, f->chain)->escape += f->w;
 		return 0;
 	}
 	uint32_t side = (uint32_t)hit->side, ps = 2 * j->m->element_patch[element] + side;
 	if (j->is_black[ps]) {
-		tally_rest(&t->tally, f->chain)->black += f->w;
+		if (!f->tallied)
+			tally_rest(&t->tally, f->chain)->black += f->w;
 		return 0;
 	}
-	tally_hit(&t->tally, f->chain, 2 * element + side, f->w, f->dir);
+	if (!f->tallied)
+		tally_hit(&t->tally, f->chain, 2 * element + side, f->w, f->dir);
 	if (t->capturing)
 		capture(t, ps, f->chain, f->w);
 	if (!j->is_ideal[ps])
@@ -133,20 +138,26 @@ static void fly(struct ff_thread *t, struct flight *stack, int n)
 	}
 }
 
-void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], double w,
-               uint32_t chain)
+static void follow(struct ff_thread *t, const double org[3], const double dir[3], double w,
+                   uint32_t chain, int tallied)
 {
 	struct flight stack[MAX_SPLITS + 3];
 
-	for (int k = 0; k < 3; k++) {
-		stack[0].org[k] = org[k];
-		stack[0].dir[k] = dir[k];
-	}
-	stack[0].w = w;
-	stack[0].chain = chain;
-	stack[0].passed = 0;
-	stack[0].splits = 0;
+	stack[0] = (struct flight){ .w = w, .chain = chain, .tallied = tallied };
+	memcpy(stack[0].org, org, sizeof stack[0].org);
+	memcpy(stack[0].dir, dir, sizeof stack[0].dir);
 	fly(t, stack, 1);
+}
+
+void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], double w,
+               uint32_t chain)
+{
+	follow(t, org, dir, w, chain, 0);
+}
+
+void ff_follow_on(struct ff_thread *t, const double org[3], const double dir[3], double w)
+{
+	follow(t, org, dir, w, 0, 1);
 }
 
 /* ---- rows ---- */
