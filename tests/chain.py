@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import os
+import resource
 import struct
 import subprocess
 import sys
@@ -23,12 +24,20 @@ class Failed(Exception):
     """A program's exit status was not 0."""
 
 
+def limited():
+    """Keeps a program that wants too much from taking the machine with it. (The
+    sanitizers reserve address space by the terabyte.)"""
+    if "san" not in os.path.basename(BUILD):
+        resource.setrlimit(resource.RLIMIT_AS, (12 << 30, 12 << 30))
+
+
 def run(tool, *arguments, expect=0, seconds=600):
     """Runs a program; returns its result, or raises if the status is another
     than expected (None: any)."""
     words = [os.path.join(BUILD, tool), *map(str, arguments)]
     try:
-        result = subprocess.run(words, capture_output=True, text=True, timeout=seconds)
+        result = subprocess.run(words, capture_output=True, text=True, timeout=seconds,
+                                preexec_fn=limited)
     except subprocess.TimeoutExpired:
         raise Failed(f"{tool} took more than {seconds} s") from None
     if expect is not None and result.returncode != expect:
