@@ -14,7 +14,7 @@
 
 typedef double four __attribute__((vector_size(32)));
 
-enum { LANES = 4, RANGES = 8 };
+enum { LANES = 4 };
 
 enum part { DIRECT, CAUSTIC, INDIRECT, PARTS };
 
@@ -23,7 +23,8 @@ struct gather {
 	struct solution *s;
 	const double *block_flux[2]; /* [blocks][bands] by freshness, over the block's sum */
 	const uint8_t *carries;      /* [blocks] bit 0: fresh flux, bit 1: mixed */
-	uint32_t *cut;               /* [RANGES+1] patch-sides */
+	uint32_t *cut;               /* [ranges+1] patch-sides */
+	uint32_t ranges;             /* one a thread */
 	four *flux[PARTS];           /* [2E] landing flux, four bands at a time */
 	four *variance;              /* [2E] */
 	int first_band;              /* of the four in work */
@@ -161,12 +162,13 @@ static int block_fluxes(const struct transport *t, const struct solution *s, dou
 	return bad;
 }
 
-static void cut_ranges(const struct model *m, uint32_t cut[RANGES + 1])
+static void cut_ranges(const struct model *m, uint32_t ranges, uint32_t *cut)
 {
-	for (uint32_t i = 0, p = 0; i <= RANGES; i++) {
-		while (p < m->patches && m->patch_start[p] * (uint64_t)RANGES < i * (uint64_t)m->elements)
+	for (uint32_t i = 0, p = 0; i <= ranges; i++) {
+		while (p < m->patches &&
+		       m->patch_start[p] * (uint64_t)ranges < i * (uint64_t)m->elements)
 			p++;
-		cut[i] = i == RANGES ? 2 * (uint32_t)m->patches : 2 * p;
+		cut[i] = i == ranges ? 2 * (uint32_t)m->patches : 2 * p;
 	}
 }
 
@@ -192,7 +194,7 @@ static void gather_bands(struct gather *g, void *room, int threads)
 	g->variance = at + PARTS * n;
 	for (g->first_band = 0; g->first_band < g->s->bands; g->first_band += LANES) {
 		memset(at, 0, (PARTS + 1) * n * sizeof *at);
-		par_for(RANGES, 1, threads, add_range, g, NULL);
+		par_for(g->ranges, 1, threads, add_range, g, NULL);
 		put_bands(g);
 	}
 }
@@ -201,23 +203,26 @@ int radiosity_gather(struct solution *s, const struct transport *t, int threads,
                      struct radiosity_report *r, struct err *e)
 {
 	double *flux[2];
-	uint32_t cut[RANGES + 1];
+	uint32_t ranges = threads > 1 ? (uint32_t)threads : 1;
+	uint32_t *cut = mem_new(ranges + 1, sizeof *cut, "irradiance", e);
 	void *room = mem_new((PARTS + 1) * s->element_sides + 1, sizeof(four), "irradiance", e);
 	uint8_t *carries = mem_new(t->blocks, 1, "irradiance", e);
-	struct gather g = { .t = t, .s = s, .cut = cut, .carries = carries };
+	struct gather g = { .t = t, .s = s, .cut = cut, .ranges = ranges,
+	                    .carries = carries };
 
 	for (int i = 0; i < 2; i++)
 		g.block_flux[i] = flux[i] = mem_new(t->blocks, (size_t)s->bands * sizeof(double),
 		                                    "flux by chain", e);
-	int bad = !room || !carries || !flux[0] || !flux[1] || block_fluxes(t, s, flux, e);
+	int bad = !room || !carries || !cut || !flux[0] || !flux[1] || block_fluxes(t, s, flux, e);
 	if (!bad) {
 		set_carries(t, s, flux, carries);
-		cut_ranges(t->m, cut);
+		cut_ranges(t->m, ranges, cut);
 		gather_bands(&g, room, threads);
 		r->gather_bytes = (double)t->entries * (t->shard[0]->value ? 8 : 12);
 	}
 	free(room);
 	free(carries);
+	free(cut);
 	free(flux[0]);
 	free(flux[1]);
 	return bad ? -1 : 0;

@@ -6,17 +6,49 @@
 #include "bsdf.h"
 #include "mem.h"
 
+/* How each patch-side splits the flux that arrives on it. */
+static void fill_parts(struct sender *s)
+{
+	const struct materials *mt = &s->m->material;
+	size_t bands = (size_t)s->bands;
+
+	for (uint32_t ps = 0; ps < 2 * s->m->patches; ps++) {
+		uint32_t material = model_patch_material(s->m, ps >> 1);
+		int side = (int)(ps & 1);
+		size_t at = material_at(mt, material, side);
+		double *part = s->part + ps * 4 * bands;
+		int lobe_r = bsdf_has_lobe(mt, material, side, 0);
+		int lobe_t = bsdf_has_lobe(mt, material, side, 1);
+		s->is_ideal[ps] = bsdf_has_ideal(mt, material, side, 0) ||
+		                  bsdf_has_ideal(mt, material, side, 1);
+		for (size_t k = 0; k < bands; k++) {
+			part[k] = mt->rho_d[at + k];
+			part[bands + k] = mt->tau_d[at + k];
+			part[2 * bands + k] = (lobe_r ? mt->rho_s[at + k] : 0) +
+			                      (lobe_t ? mt->tau_s[at + k] : 0);
+			part[3 * bands + k] = 1 - bsdf_albedo(mt, material, side, (int)k);
+		}
+	}
+}
+
 int sender_init(struct sender *s, const struct transport *t, struct err *e)
 {
 	*s = (struct sender){ .t = t, .m = t->m, .bands = t->m->bands };
 	s->chain_flux = mem_new(t->chains.n, (size_t)s->bands * sizeof(double), "chain flux", e);
 	s->touched = mem_new(t->chains.n, sizeof *s->touched, "chain flux", e);
 	s->is_touched = mem_new(t->chains.n, 1, "chain flux", e);
-	return s->chain_flux && s->touched && s->is_touched ? 0 : -1;
+	s->part = mem_new(2 * t->m->patches, 4 * (size_t)s->bands * sizeof(double), "albedos", e);
+	s->is_ideal = mem_new(2 * t->m->patches, 1, "albedos", e);
+	if (!s->chain_flux || !s->touched || !s->is_touched || !s->part || !s->is_ideal)
+		return -1;
+	fill_parts(s);
+	return 0;
 }
 
 void sender_free(struct sender *s)
 {
+	free(s->part);
+	free(s->is_ideal);
 	free(s->chain_flux);
 	free(s->touched);
 	free(s->is_touched);
@@ -86,33 +118,29 @@ static void finish(struct sender *s, double *cut)
 static void deposit(struct sender *s, struct solution *sol, const struct run *r, int to,
                     const double *x, struct sent *sent)
 {
-	const struct materials *mt = &s->m->material;
-	uint32_t material = model_patch_material(s->m, r->target >> 1);
-	int side = (int)(r->target & 1), bands = s->bands;
-	size_t at = material_at(mt, material, side);
+	int bands = s->bands;
+	const double *part = s->part + (size_t)r->target * 4 * (size_t)bands;
 	double *here = sol->unshot_diffuse + (size_t)r->target * (size_t)bands;
 	double *there = sol->unshot_diffuse + (size_t)(r->target ^ 1) * (size_t)bands;
-	int lobe_r = bsdf_has_lobe(mt, material, side, 0);
-	int lobe_t = bsdf_has_lobe(mt, material, side, 1);
-	double *link = r->link == FF_NO_ROW ? NULL
-	             : sol->unshot_link + (2 * (size_t)r->link + (size_t)to) * (size_t)bands;
 
 	for (int k = 0; k < bands; k++) {
-		size_t i = at + (size_t)k;
-		double lobes = (lobe_r ? mt->rho_s[i] : 0) + (lobe_t ? mt->tau_s[i] : 0);
-		double albedo = mt->rho_d[i] + mt->tau_d[i] + mt->rho_s[i] + mt->tau_s[i];
-		double kept = (mt->rho_d[i] + mt->tau_d[i]) * x[k];
-		here[k] += mt->rho_d[i] * x[k];
-		there[k] += mt->tau_d[i] * x[k];
-		sent->absorbed[k] += (1 - albedo) * x[k];
-		if (link) {
-			link[k] += lobes * x[k];
-			kept += lobes * x[k];
-			sent->guessed[k] += r->guessed ? lobes * x[k] : 0;
-		} else {
-			sent->cut[k] += lobes * x[k];
-		}
-		sent->kept[k] += kept;
+		double same = part[k] * x[k], other = part[bands + k] * x[k];
+		here[k] += same;
+		there[k] += other;
+		sent->kept[k] += same + other;
+		sent->absorbed[k] += part[3 * bands + k] * x[k];
+	}
+	if (r->link == FF_NO_ROW) {
+		for (int k = 0; k < bands; k++)
+			sent->cut[k] += part[2 * bands + k] * x[k];
+		return;
+	}
+	double *link = sol->unshot_link + (2 * (size_t)r->link + (size_t)to) * (size_t)bands;
+	for (int k = 0; k < bands; k++) {
+		double lobes = part[2 * bands + k] * x[k];
+		link[k] += lobes;
+		sent->kept[k] += lobes;
+		sent->guessed[k] += r->guessed ? lobes : 0;
 	}
 }
 
@@ -191,7 +219,7 @@ void send_row(struct sender *s, struct solution *sol, uint32_t row, int freshnes
 			for (int k = 0; k < bands; k++)
 				x[k] = in[k] * r->sum;
 			deposit(s, sol, r, freshness, x, sent);
-			if (t->chains.events)
+			if (s->is_ideal[r->target])
 				go_on(s, block->chain, model_patch_material(s->m, r->target >> 1),
 				      (int)(r->target & 1), x);
 		}
@@ -215,6 +243,8 @@ void send_block_flux(struct sender *s, uint32_t row, const double *flux, double 
 		go_round(s, block, in, NULL);
 		for (uint64_t i = block->run; t->chains.events && i < block[1].run; i++) {
 			const struct run *r = &t->run[i];
+			if (!s->is_ideal[r->target])
+				continue;
 			for (int k = 0; k < bands; k++)
 				x[k] = block->sum > 0 ? in[k] / block->sum * r->sum : 0;
 			go_on(s, block->chain, model_patch_material(s->m, r->target >> 1),

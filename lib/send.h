@@ -13,6 +13,9 @@ struct sender {
 	const struct transport *t;
 	const struct model *m;
 	int bands;
+	double *part;            /* [2P][4][bands] of flux arriving: rho_d, tau_d, the sum
+	                            of finite lobes, absorbed */
+	uint8_t *is_ideal;       /* [2P] some goes on by R or T */
 	double *chain_flux;      /* [chains][bands], 0 between rows */
 	uint32_t *touched;       /* chains with flux */
 	uint8_t *is_touched;
