@@ -612,7 +612,7 @@ def one_patch(lab):
         need((f.h == 0).all() and lab.ledger["escaped"][0] == lab.ledger["emitted"][0], "all escapes")
 
 
-@waiting("another order of the faces is another order of samples: equal within the standard error only")
+@case
 def order_and_threads(lab):
     o = oracles()["emitter_diffuser_receiver"]
     f = lab.run(o["materials"], o["faces"], .25)
@@ -623,9 +623,16 @@ def order_and_threads(lab):
     need(off <= 1e-12, f"permuted faces within 1e-12: {off:.2g}")
 
 
-@waiting("run by hand on `clutter` with all materials glossy; too long for every check")
+@case
 def bucket_memory(lab):
-    need(False, "not run")
+    """A link for every pair of patches would be 16 times as many."""
+    links = []
+    faces = box("w", *UNIT) + [square("lamp", "e", .45, .55, .45, .55, .9, True)]
+    for size in (1 / 4, 1 / 8):
+        lab.mesh({"w": mat(rho_d=.3, rho_s=.3, n=10), "e": mat(E=1)}, faces, size)
+        run("ffcalc", lab.path(".mesh"), "-o", lab.path(".ff"), "-n", 64, "--lobe-rays", 64)
+        links.append(len(container(lab.path(".ff"))[1]["link_target"]))
+    need(links[1] < 8 * links[0], f"links of 96 and of 384 patches: {links}")
 
 
 @case
