@@ -22,7 +22,7 @@ static const struct cli_option options[] = {
 	{ 'p', "points", "N", "hemicubes a patch-side (default 16)" },
 	{ OPT_GAIN, "emitter-gain", "N", "times as many rays for emitters (default 8)" },
 	{ OPT_LOBE_RAYS, "lobe-rays", "N", "rays a patch-side for each directional lobe (default 4096)" },
-	{ OPT_DEPTH, "depth", "N", "longest chain of ideal mirrors and panes (default 256)" },
+	{ OPT_DEPTH, "depth", "N", "most ideal mirrors and panes a ray is followed through (default 256)" },
 	{ OPT_PRECISION, "precision", "TYPE", "f32 or f64 (default f32)" },
 	{ OPT_PART, "part", "K/N", "compute the K-th of N shards only" },
 	{ OPT_SEED, "seed", "N", "seed of the sample points (default 1)" },
@@ -98,10 +98,9 @@ static json_t *options_json(const struct ff_options *o)
 		"precision", o->f64 ? "f64" : "f32",
 		"part", (json_int_t)o->part, "parts", (json_int_t)o->parts);
 
+	json_object_set_new(j, "emitter_gain", json_integer(o->emitter_gain));
 	if (o->method == FF_HEMICUBE)
 		json_object_set_new(j, "points", json_integer(o->points));
-	else
-		json_object_set_new(j, "emitter_gain", json_integer(o->emitter_gain));
 	return j;
 }
 
@@ -136,21 +135,23 @@ static int put(void *arg, const struct ff *batch, struct err *e)
 
 static void print_report(const struct ff_stats *s, const struct request *r, double seconds)
 {
-	printf("rows          %zu diffuse, %zu emission lobes, %zu reflected, %zu transmitted\n",
+	FILE *out = strcmp(r->output, "-") ? stdout : stderr;
+
+	fprintf(out, "rows          %zu diffuse, %zu emission lobes, %zu reflected, %zu transmitted\n",
 	       s->rows[FF_DIFFUSE], s->rows[FF_EMISSION], s->rows[FF_REFLECTED],
 	       s->rows[FF_TRANSMITTED]);
-	printf("links         %zu\n", s->links);
-	printf("entries       %zu in %zu blocks\n", s->entries, s->blocks);
-	printf("rays          %.0f (%.2f Mray/s)\n", s->rays, s->rays / seconds * 1e-6);
+	fprintf(out, "links         %zu\n", s->links);
+	fprintf(out, "entries       %zu in %zu blocks\n", s->entries, s->blocks);
+	fprintf(out, "rays          %.0f (%.2f Mray/s)\n", s->rays, s->rays / seconds * 1e-6);
 	if (r->ff.method == FF_HEMICUBE)
-		printf("pixels        %.0f (%.2f Mpixel/s)\n", s->samples, s->samples / seconds * 1e-6);
-	printf("row sums      within %.3g of 1 before scaling\n", s->worst_residual);
-	printf("row error     %.3g mean, %.3g worst (standard error, root of squares over receivers)\n",
+		fprintf(out, "pixels        %.0f (%.2f Mpixel/s)\n", s->samples, s->samples / seconds * 1e-6);
+	fprintf(out, "row sums      within %.3g of 1 before scaling\n", s->worst_residual);
+	fprintf(out, "row error     %.3g mean, %.3g worst (standard error, root of squares over receivers)\n",
 	       s->mean_error, s->worst_error);
 	if (s->cut > 0)
-		printf("cut           at most %.3g of a row, by --depth %u\n", s->cut, r->ff.depth);
-	printf("seconds       %.3f\n", seconds);
-	printf("peak memory   %.0f MB\n", cli_peak_megabytes());
+		fprintf(out, "cut           at most %.3g of a row, by --depth %u\n", s->cut, r->ff.depth);
+	fprintf(out, "seconds       %.3f\n", seconds);
+	fprintf(out, "peak memory   %.0f MB\n", cli_peak_megabytes());
 }
 
 static int compute(struct cli *c, const struct request *r, const struct model *m,

@@ -273,32 +273,33 @@ static void print_report(const struct job *j)
 {
 	const struct solution *s = &j->s;
 	const struct radiosity_report *r = &j->report;
+	FILE *out = strcmp(j->r->output, "-") ? stdout : stderr;
 
-	printf("shots         %llu in %llu rounds, %d lit component%s\n",
+	fprintf(out, "shots         %llu in %llu rounds, %d lit component%s\n",
 	       (unsigned long long)s->shots, (unsigned long long)r->rounds, r->components,
 	       r->components == 1 ? "" : "s");
 	for (int term = 0; term < LEDGER_TERMS; term++) {
-		printf("%-13s", term_name[term]);
+		fprintf(out, "%-13s", term_name[term]);
 		for (int k = 0; k < s->bands; k++)
-			printf(" %.9g", s->ledger[term * s->bands + k]);
-		printf("\n");
+			fprintf(out, " %.9g", s->ledger[term * s->bands + k]);
+		fprintf(out, "\n");
 	}
-	printf("unshot        %.3g of what is emitted\n", r->unshot);
-	printf("residual      %.3g of what is emitted, worst of every shot\n", r->residual);
+	fprintf(out, "unshot        %.3g of what is emitted\n", r->unshot);
+	fprintf(out, "residual      %.3g of what is emitted, worst of every shot\n", r->residual);
 	if (isfinite(r->bound))
-		printf("truncation    at most %.3g of what is emitted still to arrive (certified)\n",
+		fprintf(out, "truncation    at most %.3g of what is emitted still to arrive (certified)\n",
 		       r->bound);
 	else
-		printf("truncation    no finite bound\n");
-	printf("sampling      %.3g relative standard error of irradiance, mean over area\n",
+		fprintf(out, "truncation    no finite bound\n");
+	fprintf(out, "sampling      %.3g relative standard error of irradiance, mean over area\n",
 	       solution_mean_error(&j->m, s));
 	if (r->guessed > 0)
-		printf("directions    %.3g of what is emitted used the nearest known direction\n",
+		fprintf(out, "directions    %.3g of what is emitted used the nearest known direction\n",
 		       r->guessed);
-	printf("seconds       %.3f join, %.3f shoot, %.3f elements (%.2f GB/s of form factors)\n",
+	fprintf(out, "seconds       %.3f join, %.3f shoot, %.3f elements (%.2f GB/s of form factors)\n",
 	       j->prepare_seconds, j->solve_seconds, j->gather_seconds,
 	       r->gather_bytes / j->gather_seconds * 1e-9);
-	printf("peak memory   %.0f MB\n", cli_peak_megabytes());
+	fprintf(out, "peak memory   %.0f MB\n", cli_peak_megabytes());
 }
 
 static int make(struct job *j, struct err *e)
