@@ -13,7 +13,6 @@
 enum {
 	GROUPS = 4,               /* of sample points, whose spread gives the error */
 	CAPTURES = 4096,          /* light paths kept of a directional patch-side */
-	FLIGHTS = 8192,           /* rays of a row that go on from ideal surfaces */
 	EMISSION_SAMPLES = 16384  /* lobe directions a row of an emission lobe */
 };
 
@@ -90,21 +89,21 @@ static double passes(double *sum, double w, double parts)
 
 struct gathering {
 	double captured, followed; /* running sums over all views */
-	uint32_t flights;
 };
 
-/* Light that a pixel sends to an ideal surface lands there whole; FLIGHTS rays of equal
- * weight a row, spread over all such pixels, stand for what goes on from there. */
+/* Light that a pixel sends to an ideal surface lands there whole; rays of equal weight,
+ * on the average one a pixel, stand for what goes on from there. */
 static void fly_on(struct ff_thread *t, const struct view *v, int has_lobe,
                    const double dir[3], double w, struct gathering *g)
 {
-	double n = passes(&g->followed, w, FLIGHTS);
+	double flights = (double)t->job->grid.pixels * t->job->o.points;
+	double n = passes(&g->followed, w, flights);
 
 	if (!(n > 0))
 		return;
-	t->capturing = has_lobe && g->flights++ % (FLIGHTS / CAPTURES) == 0;
-	t->capture_weight = FLIGHTS / n;
-	ff_follow_on(t, v->eye, dir, n / FLIGHTS);
+	t->capturing = has_lobe && passes(&g->captured, n / flights, CAPTURES) > 0;
+	t->capture_weight = flights / n;
+	ff_follow_on(t, v->eye, dir, n / flights);
 	t->capturing = 0;
 }
 
