@@ -4,12 +4,28 @@
 
 #include "bsdf.h"
 #include "mem.h"
-#include "union_find.h"
 
 /* Albedos beyond this count as 1: no light is absorbed. */
 static const double white = 1 - 1e-9;
 
 /* ---- connected components: union-find with path halving ---- */
+
+static uint32_t root(uint32_t *of, uint32_t i)
+{
+	while (of[i] != i)
+		i = of[i] = of[of[i]];
+	return i;
+}
+
+static void join(uint32_t *of, uint32_t a, uint32_t b)
+{
+	a = root(of, a);
+	b = root(of, b);
+	if (a < b)
+		of[b] = a;
+	else
+		of[a] = b;
+}
 
 static int passes(const struct model *m, uint32_t patch)
 {
@@ -33,13 +49,13 @@ int components_init(struct components *c, const struct transport *t, struct err 
 		c->of[i] = i;
 	for (uint32_t p = 0; p < t->m->patches; p++)
 		if (passes(t->m, p))
-			union_find_join(c->of, 2 * p, 2 * p + 1);
+			join(c->of, 2 * p, 2 * p + 1);
 	for (size_t r = 0; r < t->rows; r++)
 		for (uint64_t i = t->block[t->row_block[r]].run;
 		     i < t->block[t->row_block[r + 1]].run; i++)
-			union_find_join(c->of, t->row_side[r], t->run[i].target);
+			join(c->of, t->row_side[r], t->run[i].target);
 	for (uint32_t i = 0; i < sides; i++)
-		c->of[i] = union_find_root(c->of, i);
+		c->of[i] = root(c->of, i);
 	/* A root is the lowest member, so its number stands before a member asks. */
 	for (uint32_t i = 0; i < sides; i++)
 		c->of[i] = c->of[i] == i ? c->n++ : c->of[c->of[i]];

@@ -2,9 +2,11 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "bsdf.h"
 #include "ff_job.h"
+#include "vec3.h"
 
 enum { PATCHES_AT_A_TIME = 64, SOBOL_POINTS_MAX = 1 << 16 };
 

@@ -9,7 +9,7 @@
 #include "ray.h"
 #include "rng.h"
 
-enum { FF_REPLICATES = 4, FF_DIMS = 4 };
+enum { FF_REPLICATES = 4, FF_DIMS = 5 };
 
 /* An element as a place to send rays from. */
 struct ff_element {

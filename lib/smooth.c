@@ -4,7 +4,6 @@
 
 #include "mem.h"
 #include "vec3.h"
-#include "union_find.h"
 
 /* An edge at a vertex, seen from a corner there. */
 struct spoke {
@@ -18,6 +17,26 @@ struct builder {
 	uint32_t *parent;         /* union-find over corners */
 	struct spoke *spoke;      /* [2 valence] */
 };
+
+static uint32_t root(uint32_t *parent, uint32_t c)
+{
+	while (parent[c] != c) {
+		parent[c] = parent[parent[c]];
+		c = parent[c];
+	}
+	return c;
+}
+
+/* The lower corner becomes the root, so the outcome does not depend on order. */
+static void join(uint32_t *parent, uint32_t a, uint32_t b)
+{
+	a = root(parent, a);
+	b = root(parent, b);
+	if (a < b)
+		parent[b] = a;
+	else
+		parent[a] = b;
+}
 
 /* start[v], corner[]: counting sort of the corners by vertex. */
 static uint32_t sort_corners(struct builder *b)
@@ -79,7 +98,7 @@ static void join_at_vertex(struct builder *b, size_t v)
 			    b->spoke[j].far != b->spoke[i].far)
 				break;
 			if (is_smooth(b, b->spoke[j].corner, b->spoke[i].corner))
-				union_find_join(b->parent, b->spoke[j].corner, b->spoke[i].corner);
+				join(b->parent, b->spoke[j].corner, b->spoke[i].corner);
 		}
 }
 
@@ -89,7 +108,7 @@ static int collect(struct builder *b, struct smooth_groups *g, struct err *e)
 	size_t n = 3 * b->m->elements;
 
 	for (size_t i = 0; i < n; i++) {
-		uint32_t r = union_find_root(b->parent, (uint32_t)i);
+		uint32_t r = root(b->parent, (uint32_t)i);
 		g->group[i] = r == i ? (uint32_t)g->groups++ : g->group[r];
 	}
 	g->start = mem_new(g->groups + 2, sizeof *g->start, "smooth groups", e);
