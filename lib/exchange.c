@@ -1,0 +1,218 @@
+#include "exchange.h"
+
+#include <math.h>
+
+#include "contour.h"
+#include "rng.h"
+#include "vec3.h"
+
+enum { CROWD_RAYS = 1024, CROWD_PARTS = 4 };
+
+void exchanger_init(struct exchanger *x, const struct exchange_options *o,
+                    const struct body_set *bodies, struct ray_scene *rays,
+                    const double centre[3])
+{
+	*x = (struct exchanger){ .o = *o, .bodies = bodies, .rays = rays, .centre = centre };
+	cubature_reach(o->relative, x->reach);
+}
+
+void exchanger_free(struct exchanger *x)
+{
+	occluded_free(&x->occluded);
+}
+
+/* ---- nothing between ---- */
+
+/* Distance of a point from a facet. */
+static double distance(const double p[3], const struct facet *f)
+{
+	double least = INFINITY, h = v3_dot(f->normal, p) - f->offset;
+	int inside = 1;
+
+	for (int i = 0; i < f->n; i++) {
+		const double *a = &f->v[3 * i], *b = &f->v[3 * ((i + 1) % f->n)];
+		double u[3], v[3], c[3];
+		v3_sub(b, a, u);
+		v3_sub(p, a, v);
+		v3_cross(u, v, c);
+		inside = inside && v3_dot(c, f->normal) >= 0;
+		double t = v3_dot(u, v) / v3_dot(u, u);
+		v3_mad(v, -fmin(1, fmax(0, t)), u, v);
+		least = fmin(least, v3_length(v));
+	}
+	return inside ? fabs(h) : least;
+}
+
+/* The lowest level for a facet seen from a distance of `gap` around its centre. */
+static int level(const struct exchanger *x, const struct facet *f, double gap)
+{
+	int l = f->n % 2 ? 1 : 0; /* level 0 is for quadrilaterals */
+
+	while (l < CUBATURE_LEVELS && gap < x->reach[l] * f->radius)
+		l++;
+	return l;
+}
+
+static const struct cubature *points(struct exchanger *x, int which, const struct facet *f,
+                                     const struct cubature *stored, int l, struct cubature *room)
+{
+	if (stored)
+		return stored;
+	*room = (struct cubature){ 0, x->points[which][0], x->points[which][1],
+	                           x->points[which][2], x->points[which][3] };
+	cubature_fill(f, l, room);
+	return room;
+}
+
+/* Lambert's formula for all of b, over the points of the smaller facet a. */
+static double lambert(const struct facet *a, const struct cubature *c, const struct facet *b)
+{
+	double sum = 0;
+
+	for (int i = 0; i < c->n; i++) {
+		double at[3] = { c->x[i], c->y[i], c->z[i] };
+		if (c->w[i] > 0)
+			sum += c->w[i] * contour_point(at, a->normal, b->n, b->v);
+	}
+	return sum;
+}
+
+double exchange_clear(struct exchanger *x, const struct facet *a, const struct cubature *pa,
+                      const struct facet *b, const struct cubature *pb)
+{
+	struct cubature ra, rb;
+	double d[3];
+
+	v3_sub(b->centre, a->centre, d);
+	double apart = v3_length(d);
+	int la = level(x, a, apart - b->radius), lb = level(x, b, apart - a->radius);
+
+	if (la < CUBATURE_LEVELS && lb < CUBATURE_LEVELS) {
+		const struct cubature *ca = points(x, 0, a, la < CUBATURE_STORED && pa ? pa + la : NULL,
+		                                   la, &ra);
+		const struct cubature *cb = points(x, 1, b, lb < CUBATURE_STORED && pb ? pb + lb : NULL,
+		                                   lb, &rb);
+		return cubature_exchange(a, ca, b, cb);
+	}
+	/* A small facet close to a large one. */
+	const struct facet *small = a->radius < b->radius ? a : b, *large = small == a ? b : a;
+	int l = level(x, small, distance(small->centre, large));
+	if (l < CUBATURE_LEVELS - 1)
+		return lambert(small, points(x, 0, small, NULL, l, &ra), large);
+	return contour_exchange(a, b);
+}
+
+/* ---- too many bodies between: rays between points of both ---- */
+
+static void point_on(const struct facet *f, double u, double v, double x[3])
+{
+	double sum = 0, area[FACET_CORNERS];
+	int i = 0;
+
+	for (int k = 1; k + 1 < f->n; k++) {
+		double n[3];
+		v3_area(f->v, &f->v[3 * k], &f->v[3 * (k + 1)], n);
+		sum += area[k] = v3_length(n);
+	}
+	for (i = 1, u *= sum; i + 2 < f->n && u >= area[i]; i++)
+		u -= area[i];
+	double r = sqrt(fmin(1, u / area[i]));
+	for (int k = 0; k < 3; k++)
+		x[k] = (1 - r) * f->v[k] + r * ((1 - v) * f->v[3 * i + k] + v * f->v[3 * i + 3 + k]);
+}
+
+static double crowded(struct exchanger *x, const struct facet *a, const struct facet *b,
+                      double clear, uint64_t seed, double *error)
+{
+	double part[CROWD_PARTS], mean = 0, square = 0;
+
+	for (uint32_t p = 0; p < CROWD_PARTS; p++) {
+		double seen = 0, all = 0;
+		for (uint32_t i = 0; i < CROWD_RAYS / CROWD_PARTS; i++) {
+			double u[4], y[3], z[3], d[3];
+			for (int k = 0; k < 4; k++)
+				u[k] = rng_sobol(i, k, seed + p);
+			point_on(a, u[0], u[1], y);
+			point_on(b, u[2], u[3], z);
+			v3_sub(z, y, d);
+			double r2 = v3_dot(d, d);
+			double w = fmax(0, v3_dot(d, a->normal)) * fmax(0, -v3_dot(d, b->normal)) / (r2 * r2);
+			v3_mad(y, 1, x->centre, y);
+			v3_mad(z, 1, x->centre, z);
+			ray_leave(x->rays, a->normal, y);
+			ray_leave(x->rays, b->normal, z);
+			all += w;
+			seen += w > 0 && !ray_blocked(x->rays, y, z) ? w : 0;
+		}
+		part[p] = all > 0 ? seen / all : 0;
+		mean += part[p] / CROWD_PARTS;
+	}
+	for (uint32_t p = 0; p < CROWD_PARTS; p++)
+		square += (part[p] - mean) * (part[p] - mean);
+	*error = clear * (sqrt(square / (CROWD_PARTS * (CROWD_PARTS - 1))) + 1. / CROWD_RAYS);
+	return clear * mean;
+}
+
+/* ---- a pair ---- */
+
+/* The part of a facet in front of another's plane. NULL if there is none; *points are
+ * dropped where the facet is cut. */
+static const struct facet *front_part(const struct facet *f, const struct facet *of, double near,
+                                      struct facet_room *room, const struct cubature **points)
+{
+	double lowest, highest;
+
+	facet_heights(f, of->normal, of->offset, &lowest, &highest);
+	if (highest <= near)
+		return NULL;
+	if (lowest >= -near)
+		return f;
+	*points = NULL;
+	return facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
+}
+
+static const struct cubature *stored(const struct facet_set *s, uint32_t i,
+                                     struct cubature at[CUBATURE_STORED])
+{
+	for (int l = 0; l < CUBATURE_STORED; l++)
+		at[l] = s->stored[l][i];
+	return at;
+}
+
+double exchange(struct exchanger *x, const struct facet_set *sa, uint32_t i,
+                const struct facet_set *sb, uint32_t j, double *error, struct err *e)
+{
+	struct cubature ra[CUBATURE_STORED], rb[CUBATURE_STORED];
+	const struct cubature *pa = stored(sa, i, ra), *pb = stored(sb, j, rb);
+	struct facet_room room[2];
+	double near = x->bodies->near;
+	const struct facet *fa = &sa->facet[i], *fb = &sb->facet[j];
+	const struct facet *a = front_part(fa, fb, near, &room[0], &pa);
+	const struct facet *b = a ? front_part(fb, fa, near, &room[1], &pb) : NULL;
+
+	*error = 0;
+	if (!b)
+		return 0;
+	x->counts.pairs++;
+	enum sight sight = sight_find(&x->sight, x->bodies, a, b);
+	if (sight == SIGHT_NONE) {
+		x->counts.hidden++;
+		return 0;
+	}
+	if (sight == SIGHT_PART) {
+		double before = x->occluded.evaluations;
+		double tolerance = x->o.absolute * fmin(fa->area, fb->area);
+		double sum = occluded_exchange(&x->occluded, &x->sight, tolerance, x->o.most, error, e);
+		x->counts.partly++;
+		x->counts.evaluations += x->occluded.evaluations - before;
+		return sum;
+	}
+	double clear = exchange_clear(x, a, pa, b, pb);
+	*error = x->o.relative * clear;
+	if (sight == SIGHT_CLEAR) {
+		x->counts.clear++;
+		return clear;
+	}
+	x->counts.crowded++;
+	return crowded(x, a, b, clear, ((uint64_t)i << 32) ^ j, error);
+}

@@ -1,0 +1,50 @@
+/* The exchange area of two facets, A_a F_ab = A_b F_ba = integral over both of
+ * cos cos / (pi r^2) where they see one another: computed once for both ways. */
+#ifndef TWOPASS_EXCHANGE_H
+#define TWOPASS_EXCHANGE_H
+
+#include "facet_set.h"
+#include "occluded.h"
+#include "ray.h"
+
+struct exchange_options {
+	double relative;      /* error of what nothing hides, relative */
+	double absolute;      /* error of a form factor, of either facet, that is partly hidden */
+	int most;             /* evaluations spent on one such */
+};
+
+/* What was done, by pairs of facets. */
+struct exchange_counts {
+	double pairs, clear, hidden, partly, crowded;
+	double evaluations;
+};
+
+/* One thread's scratch space. */
+struct exchanger {
+	struct exchange_options o;
+	const struct body_set *bodies;
+	struct ray_scene *rays;               /* for crowded pairs */
+	const double *centre;                 /* what facets are relative to */
+	double reach[CUBATURE_LEVELS];
+	struct sight_line sight;
+	struct occluded occluded;
+	double points[2][4][FACET_CORNERS * 18];
+	struct exchange_counts counts;
+};
+
+void exchanger_init(struct exchanger *x, const struct exchange_options *o,
+                    const struct body_set *bodies, struct ray_scene *rays,
+                    const double centre[3]);
+void exchanger_free(struct exchanger *x);
+
+/* Exchange area, m^2, of facets i of a set and j of a set; *error is an estimate of its
+ * absolute error. NaN and e when memory is short. */
+double exchange(struct exchanger *x, const struct facet_set *a, uint32_t i,
+                const struct facet_set *b, uint32_t j, double *error, struct err *e);
+
+/* The same with nothing between; the facets lie in front of one another. pa, pb: stored
+ * points of them, or NULL. */
+double exchange_clear(struct exchanger *x, const struct facet *a, const struct cubature *pa,
+                      const struct facet *b, const struct cubature *pb);
+
+#endif

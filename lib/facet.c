@@ -1,0 +1,78 @@
+#include "facet.h"
+
+#include <string.h>
+
+#include "vec3.h"
+
+void facet_measure(struct facet *f)
+{
+	double twice[3] = { 0 }, far = 0, sum = 0;
+
+	for (int k = 0; k < 3; k++) {
+		f->centre[k] = 0;
+		for (int i = 0; i < f->n; i++)
+			f->centre[k] += f->v[3 * i + k] / f->n;
+	}
+	for (int i = 0; i < f->n; i++) {
+		double a[3], b[3], c[3];
+		v3_sub(&f->v[3 * i], f->centre, a);
+		v3_sub(&f->v[3 * ((i + 1) % f->n)], f->centre, b);
+		v3_cross(a, b, c);
+		v3_mad(twice, 1, c, twice);
+		far = fmax(far, v3_dot(a, a));
+	}
+	f->area = v3_length(twice) / 2;
+	f->radius = sqrt(far);
+	memcpy(f->normal, twice, sizeof f->normal);
+	v3_normalise(f->normal);
+	for (int i = 0; i < f->n; i++)
+		sum += v3_dot(f->normal, &f->v[3 * i]);
+	f->offset = sum / f->n;
+}
+
+void facet_heights(const struct facet *f, const double normal[3], double offset,
+                   double *lowest, double *highest)
+{
+	*lowest = INFINITY;
+	*highest = -INFINITY;
+	for (int i = 0; i < f->n; i++) {
+		double h = v3_dot(normal, &f->v[3 * i]) - offset;
+		*lowest = fmin(*lowest, h);
+		*highest = fmax(*highest, h);
+	}
+}
+
+void edge_divide(const double a[3], double ha, const double b[3], double hb, double out[3])
+{
+	const double *low = ha < hb ? a : b, *high = ha < hb ? b : a;
+	double w = fmin(ha, hb) / (fmin(ha, hb) - fmax(ha, hb));
+
+	for (int k = 0; k < 3; k++)
+		out[k] = low[k] + w * (high[k] - low[k]);
+}
+
+int facet_clip(const struct facet *f, const double normal[3], double offset,
+               struct facet_room *out)
+{
+	double corner[FACET_CORNERS * 3], h[FACET_CORNERS];
+	int n = 0;
+
+	for (int i = 0; i < f->n; i++)
+		h[i] = v3_dot(normal, &f->v[3 * i]) - offset;
+	for (int i = 0; i < f->n; i++) {
+		int j = (i + 1) % f->n;
+		if (h[i] >= 0 && n < FACET_CORNERS)
+			memcpy(&corner[3 * n++], &f->v[3 * i], 3 * sizeof *corner);
+		if (((h[i] > 0 && h[j] < 0) || (h[i] < 0 && h[j] > 0)) && n < FACET_CORNERS)
+			edge_divide(&f->v[3 * i], h[i], &f->v[3 * j], h[j], &corner[3 * n++]);
+	}
+	if (n < 3)
+		return 0;
+	struct facet g = { .n = n, .v = out->corner };
+	memcpy(out->corner, corner, (size_t)n * 3 * sizeof *corner);
+	facet_measure(&g);
+	memcpy(g.normal, f->normal, sizeof g.normal);
+	g.offset = f->offset;
+	out->f = g;
+	return g.area > 0;
+}

@@ -1,0 +1,43 @@
+/* Facets: convex planar polygons that send light from, and receive it on, their front.
+ * A planar patch-side is one facet, or several where its outline is not convex or has many
+ * corners. */
+#ifndef TWOPASS_FACET_H
+#define TWOPASS_FACET_H
+
+#include <stddef.h>
+
+enum { FACET_CORNERS = 16 };  /* the most that a facet may have */
+
+struct facet {
+	int n;                /* corners */
+	const double *v;      /* [n][3] counter-clockwise seen from the front */
+	double normal[3];     /* unit, to the front */
+	double offset;        /* normal . x on the plane */
+	double centre[3];     /* of the corners */
+	double radius;        /* of the sphere about centre that holds the corners */
+	double area;
+};
+
+/* A facet with room for its own corners, as clipping makes it. */
+struct facet_room {
+	struct facet f;
+	double corner[FACET_CORNERS * 3];
+};
+
+/* Fills all but n and v from the corners; the plane is the mean one (Newell). */
+void facet_measure(struct facet *f);
+
+/* Signed distances of the corners of f from a plane, the lowest and the highest. */
+void facet_heights(const struct facet *f, const double normal[3], double offset,
+                   double *lowest, double *highest);
+
+/* The part of f in front of a plane (normal . x >= offset) into `out`; its plane stays
+ * f's. 1, or 0 if nothing is left. f may be out->f. */
+int facet_clip(const struct facet *f, const double normal[3], double offset,
+               struct facet_room *out);
+
+/* A point that divides the edge from a to b where heights ha and hb have opposite
+ * signs: at height 0. The same bits whichever way round the edge is given. */
+void edge_divide(const double a[3], double ha, const double b[3], double hb, double out[3]);
+
+#endif

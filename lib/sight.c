@@ -1,0 +1,295 @@
+#include "sight.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "body_polygons.h"
+#include "vec3.h"
+
+/* ---- the shaft between two facets ---- */
+
+static void grow_box(struct sight_line *l, const struct facet *f)
+{
+	for (int i = 0; i < f->n; i++)
+		for (int k = 0; k < 3; k++) {
+			l->lo[k] = fmin(l->lo[k], f->v[3 * i + k]);
+			l->hi[k] = fmax(l->hi[k], f->v[3 * i + k]);
+		}
+}
+
+static int none_above(const struct facet *f, const struct plane *p, double near)
+{
+	for (int i = 0; i < f->n; i++)
+		if (plane_height(p, &f->v[3 * i]) > near)
+			return 0;
+	return 1;
+}
+
+/* Planes through an edge of f and a corner of g that have all of both behind them. */
+static void edge_planes(struct sight_line *l, const struct facet *f, const struct facet *g)
+{
+	double near = l->set->near;
+
+	for (int i = 0; i < f->n; i++) {
+		const double *a = &f->v[3 * i], *b = &f->v[3 * ((i + 1) % f->n)];
+		double ab[3], ac[3];
+		v3_sub(b, a, ab);
+		for (int j = 0; j < g->n && l->planes < SIGHT_PLANES; j++) {
+			struct plane *p = &l->shaft[l->planes];
+			v3_sub(&g->v[3 * j], a, ac);
+			v3_cross(ab, ac, p->normal);
+			if (!(v3_normalise(p->normal) > 0))
+				continue;
+			p->offset = v3_dot(p->normal, a);
+			if (plane_height(p, f->centre) > 0) {
+				for (int k = 0; k < 3; k++)
+					p->normal[k] = -p->normal[k];
+				p->offset = -p->offset;
+			}
+			if (none_above(g, p, near) && none_above(f, p, near)) {
+				l->planes++;
+				break;
+			}
+		}
+	}
+}
+
+static void make_shaft(struct sight_line *l)
+{
+	edge_planes(l, l->a, l->b);
+	edge_planes(l, l->b, l->a);
+}
+
+/* ---- bodies in it ---- */
+
+/* Can nothing of a body be between? All of it on or behind a facet's plane. */
+static int behind_facet(const struct body_set *s, const struct body *b, const struct facet *f)
+{
+	const double *x = &s->corner[3 * (size_t)b->corner];
+
+	for (uint32_t i = 0; i < b->corners; i++)
+		if (v3_dot(f->normal, &x[3 * i]) - f->offset > s->near)
+			return 0;
+	return 1;
+}
+
+static int outside_shaft(const struct sight_line *l, const struct body *b)
+{
+	const double *x = &l->set->corner[3 * (size_t)b->corner];
+
+	for (int p = 0; p < l->planes; p++) {
+		uint32_t i = 0;
+		while (i < b->corners && plane_height(&l->shaft[p], &x[3 * i]) >= -l->set->near)
+			i++;
+		if (i == b->corners)
+			return 1;
+	}
+	return 0;
+}
+
+static int apart(const struct sight_line *l, const double lo[3], const double hi[3])
+{
+	double near = l->set->near;
+
+	for (int k = 0; k < 3; k++)
+		if (lo[k] > l->hi[k] - near || hi[k] < l->lo[k] + near) {
+			/* A flat box may lie in the shaft's flat box. */
+			if (lo[k] > l->hi[k] + near || hi[k] < l->lo[k] - near)
+				return 1;
+			if (l->hi[k] - l->lo[k] > 4 * near)
+				return 1;
+		}
+	return 0;
+}
+
+/* The highest that a box reaches above a facet's plane. */
+static double box_above(const double lo[3], const double hi[3], const struct facet *f)
+{
+	double h = -f->offset;
+
+	for (int k = 0; k < 3; k++)
+		h += f->normal[k] * (f->normal[k] > 0 ? hi[k] : lo[k]);
+	return h;
+}
+
+/* Bodies that the box and the planes of both facets do not rule out. 0 if there are too
+ * many. */
+static int collect(struct sight_line *l)
+{
+	const struct body_set *s = l->set;
+	uint32_t stack[64], depth = 0;
+
+	if (s->nodes)
+		stack[depth++] = 0;
+	while (depth) {
+		const struct body_node *n = &s->node[stack[--depth]];
+		if (apart(l, n->lo, n->hi) || box_above(n->lo, n->hi, l->a) <= s->near ||
+		    box_above(n->lo, n->hi, l->b) <= s->near)
+			continue;
+		if (n->right) {
+			stack[depth++] = n->right;
+			stack[depth++] = (uint32_t)(n - s->node) + 1;
+			continue;
+		}
+		for (uint32_t i = n->first; i < n->first + n->count; i++) {
+			const struct body *b = &s->body[i];
+			if (apart(l, b->lo, b->hi) || behind_facet(s, b, l->a) || behind_facet(s, b, l->b))
+				continue;
+			if (!l->planes)
+				make_shaft(l);
+			if (outside_shaft(l, b))
+				continue;
+			if (l->bodies == SIGHT_BLOCKERS)
+				return 0;
+			l->body[l->bodies++] = i;
+		}
+	}
+	return 1;
+}
+
+/* ---- does one body hide everything? ---- */
+
+static int inside_polygon(const struct body_set *s, const struct body *b, const double x[3])
+{
+	const struct plane *p = &s->face[b->face];
+
+	for (uint32_t i = 0; i < b->edges; i++) {
+		const struct body_edge *e = &s->edge[b->edge + i];
+		double u[3], v[3], c[3];
+		v3_sub(&s->corner[3 * (size_t)e->b], &s->corner[3 * (size_t)e->a], u);
+		v3_sub(x, &s->corner[3 * (size_t)e->a], v);
+		v3_cross(u, v, c);
+		if (v3_dot(c, p->normal) < 0)
+			return 0;
+	}
+	return 1;
+}
+
+static int cuts_flat(const struct body_set *s, const struct body *b, const double p[3],
+                     const double q[3])
+{
+	const struct plane *plane = &s->face[b->face];
+	double hp = plane_height(plane, p), hq = plane_height(plane, q), x[3];
+
+	if (!((hp > s->near && hq < -s->near) || (hp < -s->near && hq > s->near)))
+		return 0;
+	for (int k = 0; k < 3; k++)
+		x[k] = p[k] + hp / (hp - hq) * (q[k] - p[k]);
+	return inside_polygon(s, b, x);
+}
+
+static int cuts_solid(const struct body_set *s, const struct body *b, const double p[3],
+                      const double q[3])
+{
+	double from = 0, to = 1;
+
+	for (uint32_t i = 0; i < b->faces; i++) {
+		double hp = plane_height(&s->face[b->face + i], p);
+		double hq = plane_height(&s->face[b->face + i], q);
+		if (hp > 0 && hq > 0)
+			return 0;
+		if (hp > 0)
+			from = fmax(from, hp / (hp - hq));
+		else if (hq > 0)
+			to = fmin(to, hp / (hp - hq));
+	}
+	return from <= to;
+}
+
+/* The shadow of a convex body from a point is convex, so corners speak for facets. */
+static int hides(const struct body_set *s, const struct body *b, const struct facet *f,
+                 const struct facet *g)
+{
+	for (int i = 0; i < f->n; i++)
+		for (int j = 0; j < g->n; j++)
+			if (!(b->flat ? cuts_flat : cuts_solid)(s, b, &f->v[3 * i], &g->v[3 * j]))
+				return 0;
+	return 1;
+}
+
+enum sight sight_find(struct sight_line *l, const struct body_set *set, const struct facet *a,
+                      const struct facet *b)
+{
+	l->set = set;
+	l->a = a;
+	l->b = b;
+	l->planes = l->bodies = 0;
+	for (int k = 0; k < 3; k++) {
+		l->lo[k] = INFINITY;
+		l->hi[k] = -INFINITY;
+	}
+	grow_box(l, a);
+	grow_box(l, b);
+	int all = collect(l);
+	for (int i = 0; i < l->bodies; i++)
+		if (hides(set, &set->body[l->body[i]], a, b))
+			return SIGHT_NONE;
+	return !all ? SIGHT_CROWDED : l->bodies ? SIGHT_PART : SIGHT_CLEAR;
+}
+
+/* ---- blockers ---- */
+
+static void put_edge(struct blocker *o, const double a[3], const double b[3], int left, int right)
+{
+	memcpy(o->edge[o->edges].a, a, 3 * sizeof *a);
+	memcpy(o->edge[o->edges].b, b, 3 * sizeof *b);
+	o->edge[o->edges].left = left;
+	o->edge[o->edges++].right = right;
+}
+
+/* Where the plane that cuts a body crosses each of its faces. */
+struct cut {
+	int points[BODY_FACES];
+	double point[BODY_FACES][2][3];
+};
+
+static void note_cut(struct cut *c, int face, const double x[3])
+{
+	if (c->points[face] < 2)
+		memcpy(c->point[face][c->points[face]++], x, 3 * sizeof *x);
+}
+
+int blocker_make(const struct body_set *s, uint32_t body, const struct facet *f,
+                 struct blocker *out)
+{
+	const struct body *b = &s->body[body];
+	struct cut cut = { { 0 }, { { { 0 } } } };
+
+	out->edges = 0;
+	out->faces = (int)b->faces;
+	out->flat = b->flat;
+	memcpy(out->face, &s->face[b->face], b->faces * sizeof *out->face);
+	memcpy(out->centre, b->centre, sizeof out->centre);
+	for (uint32_t i = 0; i < b->edges; i++) {
+		const struct body_edge *e = &s->edge[b->edge + i];
+		const double *p = &s->corner[3 * (size_t)e->a], *q = &s->corner[3 * (size_t)e->b];
+		double hp = v3_dot(f->normal, p) - f->offset, hq = v3_dot(f->normal, q) - f->offset;
+		double x[3];
+		int p_in = hp >= -s->near, q_in = hq >= -s->near;
+		if (p_in && q_in) {
+			put_edge(out, p, q, e->left, e->right);
+			continue;
+		}
+		if (!p_in && !q_in)
+			continue;
+		if (p_in ? hp > s->near : hq > s->near) {
+			edge_divide(p, hp, q, hq, x);
+			put_edge(out, p_in ? p : x, p_in ? x : q, e->left, e->right);
+		} else {
+			memcpy(x, p_in ? p : q, sizeof x);
+		}
+		note_cut(&cut, e->left, x);
+		if (!b->flat)
+			note_cut(&cut, e->right, x);
+	}
+	for (int i = 0; i < out->faces && out->edges; i++)
+		if (cut.points[i] == 2)
+			put_edge(out, cut.point[i][0], cut.point[i][1], i, b->flat ? i : out->faces);
+	for (int k = 0; k < 3 && out->edges; k++) {
+		double sum = 0;
+		for (int i = 0; i < out->edges; i++)
+			sum += out->edge[i].a[k] + out->edge[i].b[k];
+		out->centre[k] = sum / (2 * out->edges);
+	}
+	return out->edges >= 3;
+}

@@ -1,0 +1,47 @@
+/* What stands between two facets. */
+#ifndef TWOPASS_SIGHT_H
+#define TWOPASS_SIGHT_H
+
+#include "body.h"
+#include "facet.h"
+
+enum { SIGHT_BLOCKERS = 48, SIGHT_PLANES = 160, BLOCKER_EDGES = BODY_EDGES + BODY_FACES };
+
+enum sight {
+	SIGHT_CLEAR,          /* nothing: every point of one sees every point of the other */
+	SIGHT_NONE,           /* one body hides all of one from all of the other */
+	SIGHT_PART,           /* the blockers listed may hide something */
+	SIGHT_CROWDED         /* more blockers than the list holds */
+};
+
+/* A body, or what of it is in front of a facet. */
+struct blocker {
+	int edges, faces, flat;
+	struct {
+		double a[3], b[3];
+		int left, right;      /* faces; `faces` = the cut, which no eye is in front of */
+	} edge[BLOCKER_EDGES];
+	struct plane face[BODY_FACES];
+	double centre[3];
+};
+
+struct sight_line {
+	const struct body_set *set;
+	const struct facet *a, *b;
+	struct plane shaft[SIGHT_PLANES]; /* hold both facets on or behind them */
+	int planes;
+	double lo[3], hi[3];      /* box of both */
+	uint32_t body[SIGHT_BLOCKERS];
+	int bodies;
+};
+
+/* Looks from a to b, which lie in front of one another. With SIGHT_PART the bodies that
+ * may hide something are in l->body. O(log bodies + bodies between x corners). */
+enum sight sight_find(struct sight_line *l, const struct body_set *set, const struct facet *a,
+                      const struct facet *b);
+
+/* The part of a body in front of the plane of facet b into `out`. 0 if nothing is. */
+int blocker_make(const struct body_set *s, uint32_t body, const struct facet *b,
+                 struct blocker *out);
+
+#endif
