@@ -146,13 +146,19 @@ void cache_ids(const struct model *m, struct cache_info *i)
 
 /* ---- metadata ---- */
 
+/* What this program writes and reads of a format. */
+static const char *version_of(const char *format)
+{
+	return strcmp(format, "twopass.ff") == 0 ? CACHE_FF_VERSION : CACHE_VERSION;
+}
+
 int cache_write_info(struct container_writer *w, const char *format,
                      const struct cache_info *i, struct err *e)
 {
 	const struct {
 		const char *key, *value;
 	} meta[] = {
-		{ "format", format }, { "version", CACHE_VERSION }, { "history", i->history },
+		{ "format", format }, { "version", version_of(format) }, { "history", i->history },
 		{ "options", i->options }, { "report", i->report }, { "key", i->key },
 		{ "geometry_id", i->geometry_id }, { "material_id", i->material_id },
 		{ "camera_id", i->camera_id }
@@ -190,11 +196,12 @@ static int read_id(const struct container *c, const char *key, char hex[33], str
 int cache_read_info(const struct container *c, struct cache_info *i, struct err *e)
 {
 	const char *version = container_get_meta(c, "version");
+	const char *known = version_of(container_get_meta(c, "format"));
 
 	*i = (struct cache_info){ 0 };
-	if (!version || strcmp(version, CACHE_VERSION) != 0)
-		return container_refuse(c, e, "version %.20s, this program knows version "
-		                        CACHE_VERSION, version ? version : "missing");
+	if (!version || strcmp(version, known) != 0)
+		return container_refuse(c, e, "version %.20s, this program knows version %s",
+		                        version ? version : "missing", known);
 	if (read_text(c, "history", &i->history, e) || read_text(c, "options", &i->options, e) ||
 	    read_text(c, "report", &i->report, e) || read_text(c, "key", &i->key, e) ||
 	    read_id(c, "geometry_id", i->geometry_id, e) ||
@@ -277,7 +284,7 @@ int cache_up_to_date(const char *path, const char *format, const char *key)
 		return 0;
 	version = container_get_meta(c, "version");
 	have = container_get_meta(c, "key");
-	int same = version && strcmp(version, CACHE_VERSION) == 0 && have && *have &&
+	int same = version && strcmp(version, version_of(format)) == 0 && have && *have &&
 	           strcmp(have, key) == 0;
 	container_close(c);
 	/* make(1) must see it newer than what it was made from. */

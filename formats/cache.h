@@ -6,7 +6,8 @@
 #include "../lib/model.h"
 #include "container.h"
 
-#define CACHE_VERSION "1"
+#define CACHE_VERSION "1"    /* of .mesh and .rad files */
+#define CACHE_FF_VERSION "2" /* of .ff files */
 
 /* Strings are owned (malloc) and may be NULL. */
 struct cache_info {
@@ -32,7 +33,7 @@ void cache_ids(const struct model *m, struct cache_info *i);
 void cache_camera_id(const struct camera *c, char hex[33]);
 
 /* Writes / reads the info as __metadata__ strings, leaving out what is NULL or "".
- * cache_read_info checks version. */
+ * cache_read_info checks the format's version. */
 int cache_write_info(struct container_writer *w, const char *format,
                      const struct cache_info *i, struct err *e);
 int cache_read_info(const struct container *c, struct cache_info *i, struct err *e);

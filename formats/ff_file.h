@@ -8,14 +8,17 @@
 
 struct ff_writer;
 
-/* Form factors of the model m, of which the file keeps what makes it readable by
- * itself: the patches' elements, areas and names. f64: values are float64. */
+/* Form factors of the model m (which outlives the writer), of which the file keeps
+ * what makes it readable by itself: the patches' elements, areas and names. f64:
+ * values are float64. to_patches: columns are patch-sides, and what batches have for
+ * the elements of one is summed. */
 struct ff_writer *ff_file_create(const char *path, const struct model *m, int f64,
-                                 struct err *e);
+                                 int to_patches, struct err *e);
 
 /* Appends a batch: its rows, blocks, entries, arrivals and links (all indices in
  * it relative to the batch; chains ignored, block_chain and link_chain are those
- * of the final table) behind those written so far. O(batch). */
+ * of the final table) behind those written so far. Its columns are lists; they
+ * become spans where these are shorter. O(batch). */
 int ff_file_append(struct ff_writer *w, const struct ff *batch, struct err *e);
 
 /* Writes the chain table and patch range of `whole` (its rows are ignored) and

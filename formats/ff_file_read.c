@@ -10,6 +10,13 @@
 
 #define FORMAT "twopass.ff"
 
+static enum dtype value_type(const struct container *c)
+{
+	const struct container_view *v = container_find(c, "value");
+
+	return v && v->type == DT_F64 ? DT_F64 : DT_F32;
+}
+
 /* Sizes from the arrays that have them to themselves. */
 static int get_counts(const struct container *c, struct ff *f, struct err *e)
 {
@@ -17,7 +24,8 @@ static int get_counts(const struct container *c, struct ff *f, struct err *e)
 	    fields_size(c, "chain_event", DT_U32, 1, 0, &f->chain_events, e) ||
 	    fields_size(c, "row_side", DT_U32, 1, 0, &f->rows, e) ||
 	    fields_size(c, "block_chain", DT_U32, 1, 0, &f->blocks, e) ||
-	    fields_size(c, "column", DT_U32, 1, 0, &f->entries, e) ||
+	    fields_size(c, "column", DT_U32, 1, 0, &f->columns, e) ||
+	    fields_size(c, "value", value_type(c), 1, 0, &f->entries, e) ||
 	    fields_size(c, "arrival_target", DT_U32, 1, 0, &f->arrivals, e) ||
 	    fields_size(c, "link_target", DT_U32, 1, 0, &f->links, e))
 		return -1;
@@ -30,8 +38,7 @@ static int get_counts(const struct container *c, struct ff *f, struct err *e)
 static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
                       struct err *e)
 {
-	const struct container_view *v = container_find(c, "value");
-	const int f64 = v && v->type == DT_F64;
+	const int f64 = value_type(c) == DT_F64;
 	const struct field field[] = {
 		{ &f->chain_start, "chain_start", DT_U64, 1, { f->chains + 1 } },
 		{ &f->chain_event, "chain_event", DT_U32, 1, { f->chain_events } },
@@ -45,12 +52,13 @@ static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
 		{ &f->row_block, "row_block", DT_U64, 1, { f->rows + 1 } },
 		{ &f->block_chain, "block_chain", DT_U32, 1, { f->blocks } },
 		{ &f->block_start, "block_start", DT_U64, 1, { f->blocks + 1 } },
+		{ &f->block_column, "block_column", DT_U64, 1, { f->blocks + 1 } },
 		{ &f->block_escape, "block_escape", DT_F64, 1, { f->blocks } },
 		{ &f->block_black, "block_black", DT_F64, 1, { f->blocks } },
 		{ &f->block_lost, "block_lost", DT_F64, 1, { f->blocks } },
 		{ &f->block_cut, "block_cut", DT_F64, 1, { f->blocks } },
 		{ &f->block_arrival, "block_arrival", DT_U64, 1, { f->blocks + 1 } },
-		{ &f->column, "column", DT_U32, 1, { f->entries } },
+		{ &f->column, "column", DT_U32, 1, { f->columns } },
 		{ &f->arrival_target, "arrival_target", DT_U32, 1, { f->arrivals } },
 		{ &f->arrival_direction, "arrival_direction", DT_F32, 2, { f->arrivals, 3 } },
 		{ &f->link_target, "link_target", DT_U32, 1, { f->links } },
@@ -67,11 +75,22 @@ static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
 	return fields_map(c, field, sizeof field / sizeof *field, e);
 }
 
+static int get_receivers(const struct container *c, struct ff *f, struct err *e)
+{
+	const char *text = container_get_meta(c, "receivers");
+
+	f->to_patches = text && strcmp(text, "patches") == 0;
+	if (text && (f->to_patches || strcmp(text, "elements") == 0))
+		return 0;
+	return container_refuse(c, e, "metadata receivers: %.20s, neither elements nor patches",
+	                        text ? text : "missing");
+}
+
 static int map_ff(const struct container *c, struct ff *f, struct err *e)
 {
 	uint32_t *part = NULL;
 
-	if (get_counts(c, f, e) || map_arrays(c, f, &part, e))
+	if (get_receivers(c, f, e) || get_counts(c, f, e) || map_arrays(c, f, &part, e))
 		return -1;
 	f->patch_begin = part[0];
 	f->patch_end = part[1];

@@ -4,12 +4,13 @@
 #include <string.h>
 
 #include "../lib/mem.h"
+#include "ff_file_pack.h"
 
 #define FORMAT "twopass.ff"
 
 /* Arrays that grow with every batch. */
 enum grown {
-	ROW_SCALE, ROW_RESIDUAL, ROW_ERROR, ROW_BLOCK, BLOCK_START, BLOCK_ESCAPE, BLOCK_BLACK,
+	ROW_SCALE, ROW_RESIDUAL, ROW_ERROR, ROW_BLOCK, BLOCK_START, BLOCK_COLUMN, BLOCK_ESCAPE, BLOCK_BLACK,
 	BLOCK_LOST, BLOCK_CUT, BLOCK_ARRIVAL, ROW_SIDE, ROW_SAMPLES, BLOCK_CHAIN, COLUMN, VALUE,
 	ARRIVAL_TARGET, ARRIVAL_DIRECTION, LINK_TARGET, LINK_SOURCE, LINK_LAST, LINK_CHAIN, LINK_DIRECTION,
 	LINK_ROW, ROW_KIND, GROWN
@@ -19,8 +20,10 @@ struct ff_writer {
 	struct container_writer *container;
 	char geometry_id[33];      /* of the model; .ff files depend on nothing else */
 	struct vec shifted;        /* scratch for indices moved behind earlier batches */
-	uint64_t rows, blocks, entries, arrivals;
-	int f64;
+	struct ff_packed packed;
+	const struct model *m;
+	uint64_t rows, blocks, entries, words, arrivals;
+	int f64, to_patches;
 	int array[GROWN];
 };
 
@@ -36,6 +39,7 @@ static int declare(struct ff_writer *w, struct err *e)
 		[ROW_ERROR] = { "row_error", DT_F64, 1 },
 		[ROW_BLOCK] = { "row_block", DT_U64, 1 },
 		[BLOCK_START] = { "block_start", DT_U64, 1 },
+		[BLOCK_COLUMN] = { "block_column", DT_U64, 1 },
 		[BLOCK_ESCAPE] = { "block_escape", DT_F64, 1 },
 		[BLOCK_BLACK] = { "block_black", DT_F64, 1 },
 		[BLOCK_LOST] = { "block_lost", DT_F64, 1 },
@@ -85,6 +89,7 @@ static int put_scene(struct ff_writer *w, const struct model *m, struct err *e)
 	    container_put(w->container, "patch_start", DT_U32, 1, &n1, m->patch_start, e) ||
 	    container_put(w->container, "patch_surface", DT_U32, 1, &n, m->patch_surface, e) ||
 	    container_put(w->container, "patch_sides", DT_U8, 1, &n, sides, e) ||
+	    container_meta(w->container, "receivers", w->to_patches ? "patches" : "elements", e) ||
 	    cache_write_names(w->container, "materials", m->material.name, m->material.n, e) ||
 	    cache_write_names(w->container, "surfaces", m->surface.name, m->surface.n, e);
 	free(sides);
@@ -92,14 +97,16 @@ static int put_scene(struct ff_writer *w, const struct model *m, struct err *e)
 }
 
 struct ff_writer *ff_file_create(const char *path, const struct model *m, int f64,
-                                 struct err *e)
+                                 int to_patches, struct err *e)
 {
 	struct ff_writer *w = mem_new(1, sizeof *w, path, e);
 
 	if (!w)
 		return NULL;
 	struct cache_info ids = { 0 };
+	w->m = m;
 	w->f64 = f64;
+	w->to_patches = to_patches;
 	cache_ids(m, &ids);
 	memcpy(w->geometry_id, ids.geometry_id, sizeof w->geometry_id);
 	w->container = container_create(path, e);
@@ -115,6 +122,7 @@ void ff_file_abandon(struct ff_writer *w)
 		return;
 	container_abandon(w->container);
 	free(w->shifted.data);
+	ff_packed_free(&w->packed);
 	free(w);
 }
 
@@ -177,7 +185,6 @@ static int put_rows_and_blocks(struct ff_writer *w, const struct ff *b, struct e
 		{ BLOCK_BLACK, b->block_black, b->blocks, sizeof *b->block_black },
 		{ BLOCK_LOST, b->block_lost, b->blocks, sizeof *b->block_lost },
 		{ BLOCK_CUT, b->block_cut, b->blocks, sizeof *b->block_cut },
-		{ COLUMN, b->column, b->entries, sizeof *b->column },
 		{ ARRIVAL_TARGET, b->arrival_target, b->arrivals, sizeof *b->arrival_target },
 		{ ARRIVAL_DIRECTION, b->arrival_direction, b->arrivals, 3 * sizeof(float) },
 		{ LINK_TARGET, b->link_target, b->links, sizeof *b->link_target },
@@ -195,13 +202,35 @@ static int put_rows_and_blocks(struct ff_writer *w, const struct ff *b, struct e
 	       put_starts(w, BLOCK_ARRIVAL, b->block_arrival, b->blocks, w->arrivals, e) ? -1 : 0;
 }
 
+static int put_columns(struct ff_writer *w, const struct ff *b, struct err *e)
+{
+	const struct vec *word = &w->packed.word;
+
+	if (ff_pack_columns(b, &w->packed, e) ||
+	    put_starts(w, BLOCK_COLUMN, w->packed.word_start.data, b->blocks, w->words, e) ||
+	    put(w, COLUMN, word->data, word->n, sizeof(uint32_t), e))
+		return -1;
+	w->words += word->n;
+	return 0;
+}
+
 int ff_file_append(struct ff_writer *w, const struct ff *batch, struct err *e)
 {
+	struct ff by_patch;
+
+	if (batch->to_patches && !w->to_patches)
+		return err_set(e, "%s: array column: a batch has patches, not elements",
+		               container_writer_path(w->container));
+	if (w->to_patches && !batch->to_patches) {
+		if (ff_sum_by_patch(batch, w->m, &w->packed, &by_patch, e))
+			return -1;
+		batch = &by_patch;
+	}
 	if (batch->rows >= FF_NO_ROW - w->rows)
 		return err_set(e, "%s: more than 2^32 rows; compute it in parts",
 		               container_writer_path(w->container));
-	if (put_rows_and_blocks(w, batch, e) || put_values(w, batch, e) ||
-	    put_link_rows(w, batch, e))
+	if (put_rows_and_blocks(w, batch, e) || put_columns(w, batch, e) ||
+	    put_values(w, batch, e) || put_link_rows(w, batch, e))
 		return -1;
 	w->rows += batch->rows;
 	w->blocks += batch->blocks;
@@ -216,11 +245,12 @@ static int put_table(struct ff_writer *w, const struct ff *whole, struct err *e)
 	const uint64_t starts = whole->chains + 1, events = whole->chain_events, four = 4;
 	const uint32_t part[4] = { whole->patch_begin, whole->patch_end, whole->part,
 	                           whole->parts };
-	const uint64_t end[3] = { w->blocks, w->entries, w->arrivals };
+	const uint64_t end[4] = { w->blocks, w->entries, w->arrivals, w->words };
 
 	return put(w, ROW_BLOCK, &end[0], 1, sizeof *end, e) ||
 	       put(w, BLOCK_START, &end[1], 1, sizeof *end, e) ||
 	       put(w, BLOCK_ARRIVAL, &end[2], 1, sizeof *end, e) ||
+	       put(w, BLOCK_COLUMN, &end[3], 1, sizeof *end, e) ||
 	       container_put(c, "chain_start", DT_U64, 1, &starts, whole->chain_start, e) ||
 	       container_put(c, "chain_event", DT_U32, 1, &events, whole->chain_event, e) ||
 	       container_put(c, "chain_count", DT_U32, 1, &events, whole->chain_count, e) ||

@@ -53,7 +53,7 @@ int components_init(struct components *c, const struct transport *t, struct err 
 	for (size_t r = 0; r < t->rows; r++)
 		for (uint64_t i = t->block[t->row_block[r]].run;
 		     i < t->block[t->row_block[r + 1]].run; i++)
-			join(c->of, t->row_side[r], t->run[i].target);
+			join(c->of, t->row_side[r], t->run_target[i]);
 	for (uint32_t i = 0; i < sides; i++)
 		c->of[i] = root(c->of, i);
 	/* A root is the lowest member, so its number stands before a member asks. */
@@ -129,8 +129,8 @@ static int row_leaks(struct ends *x, uint32_t row)
 		if (t->block[b].escape > 0 || t->block[b].black > 0 || t->block[b].lost > 0)
 			return 1;
 		for (uint64_t i = t->block[b].run; i < t->block[b + 1].run; i++)
-			if (albedo(t, t->run[i].target, x->band) < white ||
-			    any_row_of(x, t->run[i].target, is_leaky))
+			if (albedo(t, t->run_target[i], x->band) < white ||
+			    any_row_of(x, t->run_target[i], is_leaky))
 				return 1;
 	}
 	return 0;
@@ -142,7 +142,7 @@ static void spread(struct ends *x, uint32_t row)
 
 	for (uint64_t i = t->block[t->row_block[row]].run;
 	     i < t->block[t->row_block[row + 1]].run; i++)
-		any_row_of(x, t->run[i].target, reach);
+		any_row_of(x, t->run_target[i], reach);
 }
 
 static void start_at_emitters(struct ends *x)

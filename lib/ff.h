@@ -53,8 +53,9 @@ struct ff {
 	uint32_t *row_samples;    /* rays or hemicube pixels spent on block 0 */
 	double *row_scale;
 	double *row_residual;     /* 1 - sum before scaling (raw closure error) */
-	double *row_error;        /* standard error of the row: root of the summed
-	                             squares over receiving patch-sides */
+	double *row_error;        /* error of the row, in the norm "root of the summed squares
+	                             over receiving patch-sides": the standard error of
+	                             sampled methods, an estimate like a bound of analytic ones */
 	uint64_t *row_block;      /* [rows+1] first block */
 
 	size_t blocks;
@@ -63,8 +64,14 @@ struct ff {
 	double *block_escape, *block_black, *block_lost, *block_cut;
 	uint64_t *block_arrival;  /* [blocks+1] first arrival */
 
-	size_t entries;
-	uint32_t *column;         /* element-side, ordered by patch-side, then element */
+	/* The columns of a block are a list, a word for each entry, or spans: pairs of
+	 * words (first column, count) that stand for the columns first, first + 2, ...,
+	 * the same side of consecutive elements. A block with fewer words than entries
+	 * has spans. Columns ascend by patch-side, then element. Read them by ff_next. */
+	size_t entries, columns;
+	int to_patches;           /* 0: a column is an element-side, 1: a patch-side */
+	uint64_t *block_column;   /* [blocks+1] first word; NULL: all lists, block_start */
+	uint32_t *column;         /* [columns] words */
 	float *value;             /* one of value, value64 is NULL */
 	double *value64;
 
@@ -92,6 +99,57 @@ void ff_free(struct ff *f);
 static inline double ff_value(const struct ff *f, uint64_t i)
 {
 	return f->value ? (double)f->value[i] : f->value64[i];
+}
+
+/* First words of the blocks, [blocks+1]. */
+static inline const uint64_t *ff_block_column(const struct ff *f)
+{
+	return f->block_column ? f->block_column : f->block_start;
+}
+
+static inline int ff_has_spans(const struct ff *f, uint64_t block)
+{
+	const uint64_t *word = ff_block_column(f) + block, *entry = f->block_start + block;
+
+	return word[1] - word[0] < entry[1] - entry[0];
+}
+
+/* Neighbouring entries: columns column, column + 2, ... with values from `entry` on. */
+struct ff_span {
+	uint32_t column, count;
+	uint64_t entry;
+};
+
+/* A block's entries, span by span:
+ *     struct ff_span s;
+ *     for (struct ff_cursor c = ff_begin(f, block); ff_next(&c, &s);)
+ * Lists come in spans too, each as long as it can be. f must have passed ff_check. */
+struct ff_cursor {
+	const uint32_t *word, *end;
+	uint64_t entry;
+	int spans;
+};
+
+static inline struct ff_cursor ff_begin(const struct ff *f, uint64_t block)
+{
+	const uint64_t *word = ff_block_column(f) + block;
+
+	return (struct ff_cursor){ f->column + word[0], f->column + word[1],
+	                           f->block_start[block], ff_has_spans(f, block) };
+}
+
+static inline int ff_next(struct ff_cursor *c, struct ff_span *s)
+{
+	if (c->word == c->end)
+		return 0;
+	*s = (struct ff_span){ *c->word++, 1, c->entry };
+	if (c->spans)
+		s->count = *c->word++;
+	else
+		for (; c->word < c->end && *c->word == s->column + 2 * s->count; c->word++)
+			s->count++;
+	c->entry += s->count;
+	return 1;
 }
 
 #endif

@@ -116,23 +116,12 @@ static int check_row_chains(const struct ff *f, size_t r, struct err *e)
 	return 0;
 }
 
-static int check_closure(const struct ff *f, size_t r, struct err *e)
-{
-	uint64_t b = f->row_block[r];
-	double sum = f->block_escape[b] + f->block_black[b] + f->block_lost[b] + f->block_cut[b];
-
-	for (uint64_t i = f->block_start[b]; i < f->block_start[b + 1]; i++)
-		sum += ff_value(f, i);
-	sum *= f->row_scale[r];
-	if (!(fabs(sum - 1) <= closure_slack))
-		return err_set(e, "array value: row %zu sums to %.12g instead of 1", r, sum);
-	return 0;
-}
-
 static int check_rows(const struct ff *f, struct err *e)
 {
 	if (check_starts("row_block", f->row_block, f->rows, f->blocks, 1, e) ||
 	    check_starts("block_start", f->block_start, f->blocks, f->entries, 0, e) ||
+	    (f->block_column &&
+	     check_starts("block_column", f->block_column, f->blocks, f->columns, 0, e)) ||
 	    check_starts("block_arrival", f->block_arrival, f->blocks, f->arrivals, 0, e) ||
 	    check_below("block_chain", f->block_chain, f->blocks, f->chains, e) ||
 	    not_negative("row_error", f->row_error, f->rows, e) ||
@@ -149,42 +138,137 @@ static int check_rows(const struct ff *f, struct err *e)
 
 /* ---- entries and arrivals ---- */
 
-/* Columns of a block ascend by patch-side, then element. */
-static int check_block(const struct ff *f, const uint32_t *patch_of, size_t elements,
-                       uint64_t b, struct err *e)
+/* Where columns may lie, and in which order. */
+struct columns {
+	const struct ff *f;
+	uint64_t limit;           /* receivers: elements or patches */
+	uint32_t *patch_of;       /* of elements; NULL: receivers are patches */
+};
+
+/* Ascends with the order of columns, from 1 on. */
+static uint64_t place(const struct columns *c, uint32_t column)
 {
+	uint32_t receiver = column >> 1, patch = c->patch_of ? c->patch_of[receiver] : receiver;
+
+	return ((2 * (uint64_t)patch + (column & 1)) << 32 | receiver) + 1;
+}
+
+/* Columns first, first + 2, ...; `word` is where they stand, `last` the place of the
+ * column before them, then of their last. */
+static int check_span(const struct columns *c, uint64_t word, uint32_t first, uint32_t count,
+                      uint64_t *last, struct err *e)
+{
+	uint64_t end = (uint64_t)first + 2 * ((uint64_t)count - 1);
+
+	if (count == 0)
+		return err_set(e, "array column: value %" PRIu64 " is 0 and counts columns", word + 1);
+	if (first >> 1 >= c->limit)
+		return err_set(e, "array column: value %" PRIu64 " is %" PRIu32 ", which must be "
+		               "below %" PRIu64, word, first, 2 * c->limit);
+	if (end >> 1 >= c->limit)
+		return err_set(e, "array column: value %" PRIu64 " is %" PRIu32 ", with which %"
+		               PRIu32 " columns end beyond %" PRIu64, word + 1, count, count,
+		               2 * c->limit);
+	if (place(c, first) <= *last)
+		return err_set(e, "array column: value %" PRIu64 " is out of order", word);
+	*last = place(c, (uint32_t)end);
+	return 0;
+}
+
+static int check_spans(const struct columns *c, uint64_t b, struct err *e)
+{
+	const struct ff *f = c->f;
+	uint64_t last = 0, left = f->block_start[b + 1] - f->block_start[b];
+
+	if ((f->block_column[b + 1] - f->block_column[b]) % 2)
+		return err_set(e, "array block_column: block %" PRIu64 " has an odd number of words "
+		               "for spans", b);
+	for (uint64_t w = f->block_column[b]; w < f->block_column[b + 1]; w += 2) {
+		uint32_t count = f->column[w + 1];
+		if (check_span(c, w, f->column[w], count, &last, e))
+			return -1;
+		if (count > left)
+			return err_set(e, "array column: value %" PRIu64 " is %" PRIu32 ", with which "
+			               "block %" PRIu64 " has more columns than values", w + 1, count, b);
+		left -= count;
+	}
+	if (left)
+		return err_set(e, "array column: block %" PRIu64 " has %" PRIu64 " values too many", b,
+		               left);
+	return 0;
+}
+
+static int check_list(const struct columns *c, uint64_t b, struct err *e)
+{
+	const uint64_t *word = ff_block_column(c->f) + b;
 	uint64_t last = 0;
 
+	for (uint64_t w = word[0]; w < word[1]; w++)
+		if (check_span(c, w, c->f->column[w], 1, &last, e))
+			return -1;
+	return 0;
+}
+
+static int check_columns(const struct columns *c, uint64_t b, struct err *e)
+{
+	const struct ff *f = c->f;
+	const uint64_t *word = ff_block_column(f) + b;
+
+	if (word[1] - word[0] > f->block_start[b + 1] - f->block_start[b])
+		return err_set(e, "array block_column: block %" PRIu64 " has more columns than values",
+		               b);
+	return ff_has_spans(f, b) ? check_spans(c, b, e) : check_list(c, b, e);
+}
+
+/* Finite values >= 0 that sum to *sum. */
+static int check_values(const struct ff *f, uint64_t b, double *sum, struct err *e)
+{
+	double least = 0;
+
+	*sum = 0;
 	for (uint64_t i = f->block_start[b]; i < f->block_start[b + 1]; i++) {
-		uint32_t column = f->column[i], element = column >> 1;
 		double v = ff_value(f, i);
-		if (element >= elements)
-			return err_set(e, "array column: value %" PRIu64 " is %" PRIu32 ", which must "
-			               "be below %zu", i, column, 2 * elements);
-		if (!(v >= 0 && isfinite(v)))
-			return err_set(e, "array value: value %" PRIu64 " is %g", i, v);
-		uint64_t side = 2 * (uint64_t)patch_of[element] + (column & 1);
-		uint64_t place = (side << 32 | element) + 1;
-		if (place <= last)
-			return err_set(e, "array column: value %" PRIu64 " is out of order", i);
-		last = place;
+		*sum += v;
+		least = v < least ? v : least;
 	}
+	if (least >= 0 && isfinite(*sum))
+		return 0;
+	for (uint64_t i = f->block_start[b]; i < f->block_start[b + 1]; i++)
+		if (!(ff_value(f, i) >= 0 && isfinite(ff_value(f, i))))
+			return err_set(e, "array value: value %" PRIu64 " is %g", i, ff_value(f, i));
+	return err_set(e, "array value: block %" PRIu64 " sums to %g", b, *sum);
+}
+
+static int check_row_entries(const struct columns *c, size_t r, struct err *e)
+{
+	const struct ff *f = c->f;
+	double whole = 0, sum;
+
+	for (uint64_t b = f->row_block[r]; b < f->row_block[r + 1]; b++) {
+		if (check_columns(c, b, e) || check_values(f, b, &sum, e))
+			return -1;
+		if (b == f->row_block[r])
+			whole = sum + f->block_escape[b] + f->block_black[b] + f->block_lost[b] +
+			        f->block_cut[b];
+	}
+	whole *= f->row_scale[r];
+	if (!(fabs(whole - 1) <= closure_slack))
+		return err_set(e, "array value: row %zu sums to %.12g instead of 1", r, whole);
 	return 0;
 }
 
 static int check_entries(const struct ff *f, const struct ff_scene *s, struct err *e)
 {
-	uint32_t *patch_of = mem_new(s->elements, sizeof *patch_of, "patches of elements", e);
-	int failed = !patch_of;
+	struct columns c = { .f = f, .limit = f->to_patches ? s->patches : s->elements };
+	int failed = !f->to_patches &&
+	             !(c.patch_of = mem_new(s->elements, sizeof *c.patch_of, "patches of elements", e));
 
-	for (size_t p = 0; p < s->patches && !failed; p++)
+	for (size_t p = 0; c.patch_of && p < s->patches; p++)
 		for (uint32_t i = s->patch_start[p]; i < s->patch_start[p + 1]; i++)
-			patch_of[i] = (uint32_t)p;
-	for (uint64_t b = 0; b < f->blocks && !failed; b++)
-		failed = check_block(f, patch_of, s->elements, b, e);
-	free(patch_of);
+			c.patch_of[i] = (uint32_t)p;
 	for (size_t r = 0; r < f->rows && !failed; r++)
-		failed = check_closure(f, r, e);
+		failed = check_row_entries(&c, r, e);
+	free(c.patch_of);
 	return failed ? -1 : 0;
 }
 

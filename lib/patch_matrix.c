@@ -25,6 +25,10 @@ static void number_sides(struct patch_matrix *pm, const struct ff_scene *s, uint
 		pm->row[pm->sides] = FF_NO_ROW;
 		pm->side[pm->sides++] = ps;
 	}
+	if (pm->f->to_patches) {
+		memcpy(pm->place, column, 2 * s->patches * sizeof *column);
+		return;
+	}
 	for (uint32_t p = 0; p < s->patches; p++)
 		for (uint32_t e = s->patch_start[p]; e < s->patch_start[p + 1]; e++) {
 			pm->place[2 * (size_t)e] = column[2 * (size_t)p];
@@ -57,7 +61,8 @@ int patch_matrix_init(struct patch_matrix *pm, const struct ff *f, const struct 
 	*pm = (struct patch_matrix){ .f = f };
 	pm->side = mem_new(2 * s->patches, sizeof *pm->side, "patch-sides", e);
 	pm->row = mem_new(2 * s->patches, sizeof *pm->row, "patch-sides", e);
-	pm->place = mem_new(2 * s->elements, sizeof *pm->place, "element-sides", e);
+	pm->place = mem_new(2 * (f->to_patches ? s->patches : s->elements), sizeof *pm->place,
+	                    "receivers", e);
 	int failed = !column || !pm->side || !pm->row || !pm->place;
 	if (!failed) {
 		number_sides(pm, s, column);
@@ -83,13 +88,13 @@ void patch_matrix_row(const struct patch_matrix *pm, size_t i, double *out,
 	const uint64_t b = f->row_block[r];
 	*unmodelled = f->block_black[b];
 	*escape = f->block_escape[b] + f->block_lost[b] + f->block_cut[b];
-	for (uint64_t k = f->block_start[b]; k < f->block_start[b + 1]; k++) {
-		uint32_t at = pm->place[f->column[k]];
-		if (at == FF_NO_ROW)
-			*unmodelled += ff_value(f, k);
-		else
-			out[at] += ff_value(f, k);
-	}
+	struct ff_span s;
+	for (struct ff_cursor c = ff_begin(f, b); ff_next(&c, &s);)
+		for (uint32_t k = 0; k < s.count; k++) {
+			uint32_t at = pm->place[s.column + 2 * k];
+			double *to = at == FF_NO_ROW ? unmodelled : &out[at];
+			*to += ff_value(f, s.entry + k);
+		}
 	for (size_t k = 0; k < pm->sides; k++)
 		out[k] *= f->row_scale[r];
 	*unmodelled *= f->row_scale[r];

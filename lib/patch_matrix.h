@@ -11,7 +11,8 @@ struct patch_matrix {
 	uint32_t *side;           /* [sides] patch-side */
 	uint32_t *row;            /* [sides] row of f that says how it emits (diffuse, or
 	                             else the emission lobe), or FF_NO_ROW */
-	uint32_t *place;          /* [2E] column an element-side adds to */
+	uint32_t *place;          /* [2E], or [2P] if f is to patches: what a
+	                             column of f adds to */
 	int unmodelled;           /* 1: some row's flux meets black backs */
 };
 

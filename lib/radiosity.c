@@ -66,7 +66,6 @@ struct solver {
 	struct sender sender;
 	struct components parts;
 	double *weight;          /* [2P] 1 / flux emitted in the side's component */
-	double *link_unshot;     /* [2P] flux waiting in the links of a side, all bands */
 	double guessed, residual;
 };
 
@@ -84,11 +83,12 @@ static double priority(const struct solver *v, uint32_t ps)
 {
 	const struct solution *s = v->s;
 	size_t bands = (size_t)s->bands, at = ps * bands;
+	const double *diffuse = sender_unshot(&v->sender, ps);
 	uint64_t first = v->t->target_link[ps], n = v->t->target_link[ps + 1] - first;
 	double sum = 0;
 
 	for (size_t k = 0; k < bands; k++)
-		sum += s->unshot_emission[at + k] + s->unshot_diffuse[at + k];
+		sum += s->unshot_emission[at + k] + diffuse[k];
 	if (n)
 		sum += total(s->unshot_link + 2 * first * bands, 2 * n * bands);
 	return sum * v->weight[ps];
@@ -191,7 +191,7 @@ static void shoot_side(struct solver *v, uint32_t ps)
 	uint32_t row = t->diffuse_row[ps], lobe = t->emission_row[ps];
 
 	take(s->unshot_emission + at, emission, out, s->bands);
-	take(s->unshot_diffuse + at, diffuse, out, s->bands);
+	take(sender_unshot(&v->sender, ps), diffuse, out, s->bands);
 	if (lobe != FF_NO_ROW)
 		shoot_row(v, lobe, FRESH, emission, NULL, &sent);
 	else if (row != FF_NO_ROW)
@@ -207,13 +207,15 @@ static void shoot_side(struct solver *v, uint32_t ps)
 
 static void unshot_by_band(const struct solution *s, double *sum)
 {
-	int bands = s->bands;
+	size_t bands = (size_t)s->bands;
 
-	memset(sum, 0, (size_t)bands * sizeof *sum);
-	for (size_t i = 0; i < s->patch_sides * (size_t)bands; i++)
-		sum[i % (size_t)bands] += s->unshot_emission[i] + s->unshot_diffuse[i];
-	for (size_t i = 0; i < 2 * s->links * (size_t)bands; i++)
-		sum[i % (size_t)bands] += s->unshot_link[i];
+	memset(sum, 0, bands * sizeof *sum);
+	for (size_t i = 0; i < s->patch_sides; i++)
+		for (size_t k = 0; k < bands; k++)
+			sum[k] += s->unshot_emission[i * bands + k] + s->unshot_diffuse[i * bands + k];
+	for (size_t i = 0; i < 2 * s->links; i++)
+		for (size_t k = 0; k < bands; k++)
+			sum[k] += s->unshot_link[i * bands + k];
 }
 
 static void check_ledger(struct solver *v, const double *unshot)
@@ -281,6 +283,7 @@ static void rounds(struct solver *v, const struct radiosity_options *o,
 		if (s->round[0] == 0)
 			s->round[0] = top / 2;
 		int whole = finish_round(v, last);
+		sender_store(&v->sender, s);
 		unshot_by_band(s, unshot);
 		check_ledger(v, unshot);
 		r->rounds++;
@@ -298,7 +301,8 @@ static int solver_init(struct solver *v, struct solution *s, const struct transp
 {
 	*v = (struct solver){ .s = s, .t = t };
 	v->weight = mem_new(s->patch_sides, sizeof *v->weight, "priorities", e);
-	if (!v->weight || sender_init(&v->sender, t, e) || components_init(&v->parts, t, e))
+	if (!v->weight || sender_init(&v->sender, t, e) || sender_load(&v->sender, s, e) ||
+	    components_init(&v->parts, t, e))
 		return -1;
 	for (uint32_t ps = 0; ps < s->patch_sides; ps++)
 		for (int k = 0; k < s->bands; k++)
@@ -331,7 +335,8 @@ int radiosity_shoot(struct solution *s, const struct transport *t,
 		unshot_by_band(s, unshot);
 		r->residual = v.residual;
 		r->guessed = v.guessed / emitted;
-		r->bound = total(unshot, (size_t)s->bands) / emitted * radiosity_tail_bound(t);
+		r->solve_bytes = v.sender.bytes;
+		r->bound = total(unshot, (size_t)s->bands) / emitted * radiosity_tail_bound(t, o->threads);
 	}
 	free(v.weight);
 	sender_free(&v.sender);

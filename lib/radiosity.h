@@ -43,7 +43,8 @@ struct radiosity_report {
 	double bound;          /* certified: sum over elements of area |H - H*| from
 	                          unshot flux, over emitted flux; INFINITY = no finite bound */
 	double guessed;        /* flux that used a link of another source, over emitted */
-	double gather_bytes;   /* of form factors read by the pass over elements */
+	double solve_bytes;    /* of form factors read by shots: runs */
+	double gather_bytes;   /* and by the pass over elements: columns and values */
 };
 
 /* Zeroed state for a model and its transport with all emission unshot.
@@ -64,6 +65,6 @@ int radiosity_gather(struct solution *s, const struct transport *t, int threads,
 
 /* An upper bound, per unit of unshot flux, of the flux that will still arrive
  * anywhere; INFINITY if it cannot be bounded. */
-double radiosity_tail_bound(const struct transport *t);
+double radiosity_tail_bound(const struct transport *t, int threads);
 
 #endif

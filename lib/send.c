@@ -6,40 +6,47 @@
 #include "bsdf.h"
 #include "mem.h"
 
-/* How each patch-side splits the flux that arrives on it. */
+/* How the sides of a material split the flux that arrives on them. */
 static void fill_parts(struct sender *s)
 {
 	const struct materials *mt = &s->m->material;
-	size_t bands = (size_t)s->bands;
 
-	for (uint32_t ps = 0; ps < 2 * s->m->patches; ps++) {
-		uint32_t material = model_patch_material(s->m, ps >> 1);
-		int side = (int)(ps & 1);
+	for (uint32_t kind = 0; kind < 2 * mt->n; kind++) {
+		uint32_t material = kind >> 1;
+		int side = (int)(kind & 1);
 		size_t at = material_at(mt, material, side);
-		double *part = s->part + ps * 4 * bands;
+		double *part = (double *)(s->part + kind * PARTS * s->groups);
 		int lobe_r = bsdf_has_lobe(mt, material, side, 0);
 		int lobe_t = bsdf_has_lobe(mt, material, side, 1);
-		s->is_ideal[ps] = bsdf_has_ideal(mt, material, side, 0) ||
-		                  bsdf_has_ideal(mt, material, side, 1);
-		for (size_t k = 0; k < bands; k++) {
-			part[k] = mt->rho_d[at + k];
-			part[bands + k] = mt->tau_d[at + k];
-			part[2 * bands + k] = (lobe_r ? mt->rho_s[at + k] : 0) +
-			                      (lobe_t ? mt->tau_s[at + k] : 0);
-			part[3 * bands + k] = 1 - bsdf_albedo(mt, material, side, (int)k);
+		s->is_ideal[kind] = bsdf_has_ideal(mt, material, side, 0) ||
+		                    bsdf_has_ideal(mt, material, side, 1);
+		for (size_t k = 0; k < (size_t)s->bands; k++) {
+			part[PART_RHO * LANES * s->groups + k] = mt->rho_d[at + k];
+			part[PART_TAU * LANES * s->groups + k] = mt->tau_d[at + k];
+			part[PART_LOBES * LANES * s->groups + k] = (lobe_r ? mt->rho_s[at + k] : 0) +
+			                                           (lobe_t ? mt->tau_s[at + k] : 0);
+			part[PART_ABSORBED * LANES * s->groups + k] =
+				1 - bsdf_albedo(mt, material, side, (int)k);
 		}
 	}
+	for (uint32_t ps = 0; ps < 2 * s->m->patches; ps++)
+		s->kind[ps] = 2 * model_patch_material(s->m, ps >> 1) + (ps & 1);
 }
 
 int sender_init(struct sender *s, const struct transport *t, struct err *e)
 {
+	size_t kinds = 2 * t->m->material.n;
+
 	*s = (struct sender){ .t = t, .m = t->m, .bands = t->m->bands };
+	s->groups = lanes_groups(s->bands);
 	s->chain_flux = mem_new(t->chains.n, (size_t)s->bands * sizeof(double), "chain flux", e);
 	s->touched = mem_new(t->chains.n, sizeof *s->touched, "chain flux", e);
 	s->is_touched = mem_new(t->chains.n, 1, "chain flux", e);
-	s->part = mem_new(2 * t->m->patches, 4 * (size_t)s->bands * sizeof(double), "albedos", e);
-	s->is_ideal = mem_new(2 * t->m->patches, 1, "albedos", e);
-	if (!s->chain_flux || !s->touched || !s->is_touched || !s->part || !s->is_ideal)
+	s->part = lanes_new(kinds * PARTS * s->groups, &s->room[0], "albedos", e);
+	s->is_ideal = mem_new(kinds, 1, "albedos", e);
+	s->kind = mem_new(2 * t->m->patches, sizeof *s->kind, "albedos", e);
+	if (!s->chain_flux || !s->touched || !s->is_touched || !s->part || !s->is_ideal ||
+	    !s->kind)
 		return -1;
 	fill_parts(s);
 	return 0;
@@ -47,12 +54,34 @@ int sender_init(struct sender *s, const struct transport *t, struct err *e)
 
 void sender_free(struct sender *s)
 {
-	free(s->part);
+	free(s->room[0]);
+	free(s->room[1]);
+	free(s->kind);
 	free(s->is_ideal);
 	free(s->chain_flux);
 	free(s->touched);
 	free(s->is_touched);
 	*s = (struct sender){ 0 };
+}
+
+int sender_load(struct sender *s, const struct solution *sol, struct err *e)
+{
+	size_t bands = (size_t)s->bands;
+
+	s->unshot = lanes_new(2 * s->m->patches * s->groups, &s->room[1], "unshot flux", e);
+	if (!s->unshot)
+		return -1;
+	for (uint32_t ps = 0; ps < 2 * s->m->patches; ps++)
+		memcpy(sender_unshot(s, ps), sol->unshot_diffuse + ps * bands, bands * sizeof(double));
+	return 0;
+}
+
+void sender_store(const struct sender *s, struct solution *sol)
+{
+	size_t bands = (size_t)s->bands;
+
+	for (uint32_t ps = 0; ps < 2 * s->m->patches; ps++)
+		memcpy(sol->unshot_diffuse + ps * bands, sender_unshot(s, ps), bands * sizeof(double));
 }
 
 static void into_chain(struct sender *s, uint32_t chain, const double *x, const double *part)
@@ -113,35 +142,110 @@ static void finish(struct sender *s, double *cut)
 	s->touches = 0;
 }
 
-/* Splits flux x arriving at a run's patch-side into what is absorbed and what is
- * unshot again. */
-static void deposit(struct sender *s, struct solution *sol, const struct run *r, int to,
-                    const double *x, struct sent *sent)
-{
-	int bands = s->bands;
-	const double *part = s->part + (size_t)r->target * 4 * (size_t)bands;
-	double *here = sol->unshot_diffuse + (size_t)r->target * (size_t)bands;
-	double *there = sol->unshot_diffuse + (size_t)(r->target ^ 1) * (size_t)bands;
+/* Flux x per unit of the values lands on the sides of a block that do no more than
+ * absorb and reflect diffusely. */
+struct plain {
+	const struct sender *s;
+	size_t group;
+	lanes x, kept[2], absorbed[2];
+};
 
-	for (int k = 0; k < bands; k++) {
-		double same = part[k] * x[k], other = part[bands + k] * x[k];
-		here[k] += same;
-		there[k] += other;
-		sent->kept[k] += same + other;
-		sent->absorbed[k] += part[3 * bands + k] * x[k];
+static inline void land_plain(struct plain *p, uint64_t run, int half)
+{
+	const struct sender *s = p->s;
+	uint32_t target = s->t->run_target[run];
+	const lanes *part = s->part + s->kind[target] * PARTS * s->groups + p->group;
+	lanes x = p->x * s->t->run_sum[run], same = part[PART_RHO * s->groups] * x;
+
+	s->unshot[target * s->groups + p->group] += same;
+	p->kept[half] += same;
+	p->absorbed[half] += part[PART_ABSORBED * s->groups] * x;
+}
+
+/* Two sums at a time: one addition would wait for the last. */
+static void send_plain(struct sender *s, const struct block *block, const double *in,
+                       struct sent *sent)
+{
+	int first = 0;
+
+	for (size_t g = 0; g < s->groups; g++, first += LANES) {
+		struct plain p = { .s = s, .group = g };
+		int n = s->bands - first < LANES ? s->bands - first : LANES;
+		uint64_t i = block->run;
+		for (int k = 0; k < n; k++)
+			p.x[k] = in[first + k];
+		for (; i + 1 < block->special; i += 2) {
+			land_plain(&p, i, 0);
+			land_plain(&p, i + 1, 1);
+		}
+		if (i < block->special)
+			land_plain(&p, i, 0);
+		for (int k = 0; k < n; k++) {
+			sent->kept[first + k] += p.kept[0][k] + p.kept[1][k];
+			sent->absorbed[first + k] += p.absorbed[0][k] + p.absorbed[1][k];
+		}
 	}
-	if (r->link == FF_NO_ROW) {
-		for (int k = 0; k < bands; k++)
-			sent->cut[k] += part[2 * bands + k] * x[k];
+	s->bytes += (double)((block->special - block->run) * s->groups) *
+	            (sizeof *s->t->run_target + sizeof *s->t->run_sum);
+}
+
+static void to_link(const struct sender *s, struct solution *sol, uint32_t link, int to,
+                    const double *lobes, struct sent *sent)
+{
+	int guessed = link & RUN_GUESSED ? 1 : 0;
+
+	if (link == FF_NO_ROW) {
+		for (int k = 0; k < s->bands; k++)
+			sent->cut[k] += lobes[k];
 		return;
 	}
-	double *link = sol->unshot_link + (2 * (size_t)r->link + (size_t)to) * (size_t)bands;
-	for (int k = 0; k < bands; k++) {
-		double lobes = part[2 * bands + k] * x[k];
-		link[k] += lobes;
-		sent->kept[k] += lobes;
-		sent->guessed[k] += r->guessed ? lobes : 0;
+	double *flux = sol->unshot_link +
+	               (2 * (size_t)(link & ~RUN_GUESSED) + (size_t)to) * (size_t)s->bands;
+	for (int k = 0; k < s->bands; k++) {
+		flux[k] += lobes[k];
+		sent->kept[k] += lobes[k];
+		sent->guessed[k] += guessed ? lobes[k] : 0;
 	}
+}
+
+/* Flux x lands on a patch-side of any kind. */
+static void land_special(struct sender *s, struct solution *sol, uint32_t target,
+                         uint32_t link, int to, const double *x, struct sent *sent)
+{
+	size_t width = LANES * s->groups;
+	const double *part = (const double *)(s->part + s->kind[target] * PARTS * s->groups);
+	double *here = sender_unshot(s, target), *there = sender_unshot(s, target ^ 1);
+	double lobes[BANDS_MAX];
+
+	for (int k = 0; k < s->bands; k++) {
+		const double *of = part + k;
+		double same = of[PART_RHO * width] * x[k], other = of[PART_TAU * width] * x[k];
+		here[k] += same;
+		there[k] += other;
+		lobes[k] = of[PART_LOBES * width] * x[k];
+		sent->kept[k] += same + other;
+		sent->absorbed[k] += of[PART_ABSORBED * width] * x[k];
+	}
+	to_link(s, sol, link, to, lobes, sent);
+}
+
+static void send_special(struct sender *s, struct solution *sol, const struct block *block,
+                         int freshness, const double *in, struct sent *sent)
+{
+	const struct transport *t = s->t;
+	const uint32_t *link = t->run_link + block->link;
+	double x[BANDS_MAX];
+
+	for (uint64_t i = block->special; i < block[1].run; i++) {
+		uint32_t target = t->run_target[i];
+		for (int k = 0; k < s->bands; k++)
+			x[k] = in[k] * t->run_sum[i];
+		land_special(s, sol, target, *link++, freshness, x, sent);
+		if (s->is_ideal[s->kind[target]])
+			go_on(s, block->chain, s->kind[target] >> 1, (int)(target & 1), x);
+	}
+	s->bytes += (double)(block[1].run - block->special) *
+	            (2 * sizeof *t->run_target + sizeof *t->run_sum);
 }
 
 /* How much of the flux in a block comes back to it, per band, through events whose
@@ -159,11 +263,10 @@ static void loop_gain(const struct sender *s, const struct block *block, double 
 		double landed = 0;
 		if (child[event] != block->chain)
 			continue;
-		for (uint64_t i = block->run; i < block[1].run; i++) {
-			uint32_t target = s->t->run[i].target;
-			if (2 * model_patch_material(s->m, target >> 1) + (target & 1) == id / 2)
-				landed += s->t->run[i].sum;
-		}
+		/* What reflects or transmits ideally is special. */
+		for (uint64_t i = block->special; i < block[1].run; i++)
+			if (s->kind[s->t->run_target[i]] == id / 2)
+				landed += s->t->run_sum[i];
 		for (int k = 0; k < s->bands; k++)
 			gain[k] += (id & 1 ? mt->tau_s : mt->rho_s)[at + (size_t)k] * landed / block->sum;
 	}
@@ -197,7 +300,7 @@ void send_row(struct sender *s, struct solution *sol, uint32_t row, int freshnes
 
 	for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
 		const struct block *block = &t->block[b];
-		double in[BANDS_MAX], x[BANDS_MAX], any = 0;
+		double in[BANDS_MAX], any = 0;
 		if (block->chain)
 			take(s, block->chain, in);
 		for (int k = 0; k < bands; k++) {
@@ -214,15 +317,8 @@ void send_row(struct sender *s, struct solution *sol, uint32_t row, int freshnes
 			sent->lost[k] += in[k] * block->lost;
 			sent->cut[k] += in[k] * block->cut;
 		}
-		for (uint64_t i = block->run; i < block[1].run; i++) {
-			const struct run *r = &t->run[i];
-			for (int k = 0; k < bands; k++)
-				x[k] = in[k] * r->sum;
-			deposit(s, sol, r, freshness, x, sent);
-			if (s->is_ideal[r->target])
-				go_on(s, block->chain, model_patch_material(s->m, r->target >> 1),
-				      (int)(r->target & 1), x);
-		}
+		send_plain(s, block, in, sent);
+		send_special(s, sol, block, freshness, in, sent);
 	}
 	finish(s, sent->cut);
 }
@@ -241,14 +337,13 @@ void send_block_flux(struct sender *s, uint32_t row, const double *flux, double 
 		else
 			memcpy(in, flux, (size_t)bands * sizeof *in);
 		go_round(s, block, in, NULL);
-		for (uint64_t i = block->run; t->chains.events && i < block[1].run; i++) {
-			const struct run *r = &t->run[i];
-			if (!s->is_ideal[r->target])
+		for (uint64_t i = block->special; t->chains.events && i < block[1].run; i++) {
+			uint32_t kind = s->kind[t->run_target[i]];
+			if (!s->is_ideal[kind])
 				continue;
 			for (int k = 0; k < bands; k++)
-				x[k] = block->sum > 0 ? in[k] / block->sum * r->sum : 0;
-			go_on(s, block->chain, model_patch_material(s->m, r->target >> 1),
-			      (int)(r->target & 1), x);
+				x[k] = block->sum > 0 ? in[k] / block->sum * t->run_sum[i] : 0;
+			go_on(s, block->chain, kind >> 1, (int)(kind & 1), x);
 		}
 	}
 	finish(s, NULL);

@@ -2,6 +2,7 @@
 #ifndef TWOPASS_SEND_H
 #define TWOPASS_SEND_H
 
+#include "lanes.h"
 #include "solution.h"
 #include "transport.h"
 
@@ -13,14 +14,22 @@ struct sender {
 	const struct transport *t;
 	const struct model *m;
 	int bands;
-	double *part;            /* [2P][4][bands] of flux arriving: rho_d, tau_d, the sum
-	                            of finite lobes, absorbed */
-	uint8_t *is_ideal;       /* [2P] some goes on by R or T */
+	size_t groups;           /* vectors for the bands */
+	uint32_t *kind;          /* [2P] material and side, an index of part and is_ideal */
+	lanes *part;             /* [kinds][PARTS][groups] of flux arriving */
+	uint8_t *is_ideal;       /* [kinds] some goes on by R or T */
+	lanes *unshot;           /* [2P][groups] flux to leave diffusely, sender_load */
+	void *room[2];           /* memory of part and unshot */
 	double *chain_flux;      /* [chains][bands], 0 between rows */
 	uint32_t *touched;       /* chains with flux */
 	uint8_t *is_touched;
 	size_t touches;
+	double bytes;            /* of runs read by send_row */
 };
+
+/* What becomes of flux arriving: reflected and transmitted diffusely, by all finite
+ * lobes, absorbed. */
+enum { PART_RHO, PART_TAU, PART_LOBES, PART_ABSORBED, PARTS };
 
 /* What became of a row's flux, per band. */
 struct sent {
@@ -32,7 +41,18 @@ struct sent {
 int sender_init(struct sender *s, const struct transport *t, struct err *e);
 void sender_free(struct sender *s);
 
-/* Sends flux[bands] by a row into the unshot arrays of sol; adds to `sent`. */
+/* The unshot diffuse flux of a solution into s->unshot, which send_row adds to, and
+ * back. 0, or -1 and e. */
+int sender_load(struct sender *s, const struct solution *sol, struct err *e);
+void sender_store(const struct sender *s, struct solution *sol);
+
+/* Unshot diffuse flux of a patch-side, [bands]. */
+static inline double *sender_unshot(const struct sender *s, uint32_t ps)
+{
+	return (double *)(s->unshot + ps * s->groups);
+}
+
+/* Sends flux[bands] by a row into s->unshot and sol's unshot_link; adds to `sent`. */
 void send_row(struct sender *s, struct solution *sol, uint32_t row, int freshness,
               const double *flux, struct sent *sent);
 

@@ -9,6 +9,7 @@
  * surface: the largest number of arrivals a row makes multiplies the bound. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "bsdf.h"
 #include "mem.h"
@@ -19,10 +20,10 @@ enum { STEPS = 64 };
 
 struct tail {
 	const struct transport *t;
-	size_t bands;
+	size_t bands, groups;
 	double *in;           /* [blocks][bands] flux by each block of unit flux, over its sum */
 	double *row;          /* [rows][bands] */
-	double *q;            /* [2P][bands] */
+	lanes *q;             /* [2P][groups] */
 	double arrivals;      /* largest of a row */
 };
 
@@ -45,20 +46,33 @@ static void unit_rows(struct tail *x, struct sender *sender)
 	}
 }
 
-static void rows_step(struct tail *x)
+/* What a block's runs make of unit flux by unit of value, for a vector of bands. */
+static lanes block_step(const struct tail *x, uint64_t b, size_t group)
 {
 	const struct transport *t = x->t;
+	lanes sum = { 0 };
 
-	for (uint32_t r = 0; r < t->rows; r++)
-		for (size_t k = 0; k < x->bands; k++) {
-			double sum = 0;
-			for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++) {
-				double in = x->in[b * x->bands + k];
-				for (uint64_t i = t->block[b].run; in > 0 && i < t->block[b + 1].run; i++)
-					sum += in * t->run[i].sum * x->q[t->run[i].target * x->bands + k];
+	for (uint64_t i = t->block[b].run; i < t->block[b + 1].run; i++)
+		sum += t->run_sum[i] * x->q[t->run_target[i] * x->groups + group];
+	return sum;
+}
+
+static void rows_step(void *arg, size_t begin, size_t end, int thread)
+{
+	const struct tail *x = arg;
+	const struct transport *t = x->t;
+
+	(void)thread;
+	for (size_t r = begin; r < end; r++) {
+		double *row = x->row + r * x->bands;
+		memset(row, 0, x->bands * sizeof *row);
+		for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
+			for (size_t g = 0; g < x->groups; g++) {
+				lanes sum = block_step(x, b, g);
+				for (size_t k = g * LANES; k < x->bands && k < (g + 1) * LANES; k++)
+					row[k] += x->in[b * x->bands + k] * sum[k % LANES];
 			}
-			x->row[r * x->bands + k] = sum;
-		}
+	}
 }
 
 /* Of flux arriving on a side, what is unshot again times what its rows make of it. */
@@ -100,7 +114,7 @@ static double sides_step(struct tail *x, int first)
 
 	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
 		for (size_t k = 0; k < x->bands; k++) {
-			double *q = &x->q[ps * x->bands + k];
+			double *q = (double *)(x->q + ps * x->groups) + k;
 			*q = !model_side_modelled(m, ps) ? 0
 			   : first ? albedo_shot(x->t, ps, k) : side_step(x, ps, k);
 			top = fmax(top, *q);
@@ -108,36 +122,38 @@ static double sides_step(struct tail *x, int first)
 	return top;
 }
 
-static double series(struct tail *x)
+static double series(struct tail *x, int threads)
 {
 	double sum = 1, top = sides_step(x, 1);
 
 	for (int k = 1; k < STEPS && top > .5; k++) {
 		sum += top;
-		rows_step(x);
+		par_for(x->t->rows, 64, threads, rows_step, x, NULL);
 		top = sides_step(x, 0);
 	}
 	return top < 1 ? sum / (1 - top) * x->arrivals : INFINITY;
 }
 
-double radiosity_tail_bound(const struct transport *t)
+double radiosity_tail_bound(const struct transport *t, int threads)
 {
 	struct err e = { 0 };
 	struct sender sender;
 	size_t bands = (size_t)t->m->bands;
-	struct tail x = { .t = t, .bands = bands, .arrivals = 1 };
+	struct tail x = { .t = t, .bands = bands, .groups = lanes_groups(t->m->bands),
+	                  .arrivals = 1 };
+	void *room;
 	double bound = INFINITY;
 
 	x.in = mem_new(t->blocks, bands * sizeof(double), "bound", &e);
 	x.row = mem_new(t->rows, bands * sizeof(double), "bound", &e);
-	x.q = mem_new(2 * t->m->patches, bands * sizeof(double), "bound", &e);
+	x.q = lanes_new(2 * t->m->patches * x.groups, &room, "bound", &e);
 	if (sender_init(&sender, t, &e) == 0 && x.in && x.row && x.q) {
 		unit_rows(&x, &sender);
-		bound = series(&x);
+		bound = series(&x, threads);
 	}
 	sender_free(&sender);
 	free(x.in);
 	free(x.row);
-	free(x.q);
+	free(room);
 	return bound;
 }

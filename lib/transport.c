@@ -6,7 +6,14 @@
 #include "bsdf.h"
 #include "par.h"
 
+static const char what[] = "form factors by patch";
+
 /* ---- shards ---- */
+
+static const char *receivers(const struct ff *f)
+{
+	return f->to_patches ? "patches" : "elements";
+}
 
 static int check_parts(const struct ff **f, const char *const *names, size_t n, struct err *e)
 {
@@ -15,6 +22,10 @@ static int check_parts(const struct ff **f, const char *const *names, size_t n, 
 			return err_set(e, "%s: part %u of %u, but %s is one of %u; give all parts of "
 			               "one run of ffcalc", names[i], f[i]->part, f[i]->parts,
 			               names[0], f[0]->parts);
+		if (f[i]->to_patches != f[0]->to_patches)
+			return err_set(e, "%s: receivers are %s, but %s of %s; give all parts of "
+			               "one run of ffcalc", names[i], receivers(f[i]),
+			               receivers(f[0]), names[0]);
 		for (size_t k = 0; k < i; k++)
 			if (f[k]->part == f[i]->part)
 				return err_set(e, "%s: overlaps %s, both are part %u of %u",
@@ -74,8 +85,10 @@ static int size_arrays(struct transport *t, struct err *e)
 		t->rows += t->shard[i]->rows;
 		t->blocks += t->shard[i]->blocks;
 		t->links += t->shard[i]->links;
-		t->entries += t->shard[i]->entries;
 	}
+	if (t->links >= RUN_GUESSED)
+		return err_set(e, "more than 2^31 links between directional patches; use larger "
+		               "patches (mesh -p)");
 	t->row_side = mem_new(t->rows, sizeof *t->row_side, "rows", e);
 	t->row_kind = mem_new(t->rows, 1, "rows", e);
 	t->row_samples = mem_new(t->rows, sizeof *t->row_samples, "rows", e);
@@ -114,7 +127,7 @@ static void put_rows(struct transport *t, uint32_t shard, const uint32_t *chain,
 	}
 	for (size_t b = 0; b < f->blocks; b++)
 		t->block[block + b] = (struct block){ .chain = chain[f->block_chain[b]],
-			.shard = shard, .escape = f->block_escape[b], .black = f->block_black[b],
+			.shard = shard, .local = b, .escape = f->block_escape[b], .black = f->block_black[b],
 			.lost = f->block_lost[b], .cut = f->block_cut[b] };
 }
 
@@ -168,15 +181,41 @@ static void sort_links(struct transport *t, struct link_key *l)
 	}
 }
 
-/* The link for light of a source and chain, or the one that looks nearest to where
- * the light comes from. */
-static uint32_t find_link(const struct transport *t, const struct link_key *l, uint32_t target,
-                          uint32_t source, uint32_t chain, const float *from, uint32_t *guessed)
+static const float *arrival(const struct ff *f, size_t block, uint32_t target)
 {
-	size_t lo = t->target_link[target], hi = t->target_link[target + 1], end = hi;
+	for (uint64_t i = f->block_arrival[block]; i < f->block_arrival[block + 1]; i++)
+		if (f->arrival_target[i] == target)
+			return &f->arrival_direction[3 * i];
+	return NULL;
+}
+
+/* The link that looks nearest to where the light of a block comes from. */
+static uint32_t nearest_link(const struct transport *t, const struct link_key *l,
+                             const struct block *block, uint32_t target)
+{
+	const float *from = arrival(t->shard[block->shard], block->local, target);
+	size_t begin = t->target_link[target], end = t->target_link[target + 1], found = begin;
+	float best = -2;
+
+	for (size_t i = begin; i < end; i++) {
+		const float *d = l[i].direction;
+		float c = from ? d[0] * from[0] + d[1] * from[1] + d[2] * from[2] : 0;
+		if (c > best) {
+			best = c;
+			found = i;
+		}
+	}
+	return found < end ? (uint32_t)found | RUN_GUESSED : FF_NO_ROW;
+}
+
+/* The link for light of a source and chain, or the nearest. */
+static uint32_t find_link(const struct transport *t, const struct link_key *l,
+                          const struct block *block, uint32_t target, uint32_t source)
+{
+	size_t lo = t->target_link[target], hi = t->target_link[target + 1];
+	uint32_t chain = block->chain;
 	struct link_key want = { .target = target, .source = source, .chain = chain,
 	                         .row = { UINT32_MAX, 0 } };
-	float best = -2;
 
 	/* The last link that does not begin beyond the source. */
 	for (size_t n = lo; n < hi;) {
@@ -186,130 +225,182 @@ static uint32_t find_link(const struct transport *t, const struct link_key *l, u
 		else
 			hi = mid;
 	}
-	*guessed = !(hi > lo && l[hi - 1].chain == chain && l[hi - 1].source <= source &&
-	             l[hi - 1].last >= source);
-	if (!*guessed)
+	if (hi > lo && l[hi - 1].chain == chain && l[hi - 1].source <= source &&
+	    l[hi - 1].last >= source)
 		return (uint32_t)(hi - 1);
-	size_t found = lo;
-	for (size_t i = lo; i < end; i++) {
-		const float *d = l[i].direction;
-		float c = from ? d[0] * from[0] + d[1] * from[1] + d[2] * from[2] : 0;
-		if (c > best) {
-			best = c;
-			found = i;
-		}
-	}
-	return found < end ? (uint32_t)found : FF_NO_ROW;
+	return nearest_link(t, l, block, target);
 }
 
 /* ---- runs ---- */
 
-static uint32_t entry_target(const struct transport *t, const struct ff *f, uint64_t i)
-{
-	return 2 * t->m->element_patch[f->column[i] >> 1] + (f->column[i] & 1);
-}
-
-static uint64_t run_end(const struct transport *t, const struct ff *f, uint64_t i, uint64_t end)
-{
-	uint32_t target = entry_target(t, f, i);
-
-	while (i < end && entry_target(t, f, i) == target)
-		i++;
-	return i;
-}
-
 struct pass {
 	struct transport *t;
 	const struct link_key *link;
-	const size_t *first_block;             /* by shard */
-	const uint8_t *has_lobe;
-	int fill;                              /* 0: count runs, 1: write them */
+	uint8_t *is_special;                   /* [2P] */
 };
 
-static const float *arrival(const struct ff *f, size_t block, uint32_t target)
+static void mark_special(const struct transport *t, uint8_t *is_special)
 {
-	for (uint64_t i = f->block_arrival[block]; i < f->block_arrival[block + 1]; i++)
-		if (f->arrival_target[i] == target)
-			return &f->arrival_direction[3 * i];
-	return NULL;
+	const struct materials *mt = &t->m->material;
+
+	for (uint32_t ps = 0; ps < 2 * t->m->patches; ps++) {
+		uint32_t material = model_patch_material(t->m, ps >> 1);
+		int side = (int)(ps & 1);
+		size_t at = material_at(mt, material, side);
+		for (int k = 0; k < t->m->bands; k++)
+			is_special[ps] |= mt->tau_d[at + (size_t)k] > 0;
+		for (int way = 0; way < 2; way++)
+			is_special[ps] |= bsdf_has_lobe(mt, material, side, way) ||
+			                  bsdf_has_ideal(mt, material, side, way);
+		is_special[ps] |= t->target_link[ps + 1] > t->target_link[ps];
+	}
 }
 
-static void fill_block(const struct pass *p, const struct ff *f, size_t local, size_t b,
-                       uint32_t source)
+/* The entries of a block, patch-side by patch-side. */
+struct landing {
+	const struct model *m;
+	const struct ff *f;
+	struct ff_cursor cursor;
+	struct ff_span rest;                   /* of a span that reaches beyond the side */
+};
+
+/* The next entries on one patch-side of a span, 0 at the end. */
+static int next_piece(struct landing *l, struct ff_span *piece, uint32_t *target)
+{
+	if (l->rest.count == 0 && !ff_next(&l->cursor, &l->rest))
+		return 0;
+	uint32_t receiver = l->rest.column >> 1, n = 1;
+	*piece = l->rest;
+	if (l->f->to_patches) {
+		*target = l->rest.column;
+	} else {
+		uint32_t patch = l->m->element_patch[receiver];
+		n = l->m->patch_start[patch + 1] - receiver;
+		*target = 2 * patch + (l->rest.column & 1);
+	}
+	piece->count = n < l->rest.count ? n : l->rest.count;
+	l->rest.column += 2 * piece->count;
+	l->rest.entry += piece->count;
+	l->rest.count -= piece->count;
+	return 1;
+}
+
+static struct landing land(const struct transport *t, const struct block *block)
+{
+	const struct ff *f = t->shard[block->shard];
+
+	return (struct landing){ .m = t->m, .f = f, .cursor = ff_begin(f, block->local) };
+}
+
+static void count_runs(const struct pass *p, struct block *block)
+{
+	struct landing l = land(p->t, block);
+	struct ff_span piece;
+	uint32_t target, last = UINT32_MAX;
+
+	while (next_piece(&l, &piece, &target)) {
+		block->run += target != last;
+		block->link += target != last && p->is_special[target];
+		last = target;
+	}
+}
+
+static double sum_values(const struct ff *f, const struct ff_span *s, double sum)
+{
+	for (uint32_t k = 0; k < s->count; k++)
+		sum += ff_value(f, s->entry + k);
+	return sum;
+}
+
+static void fill_runs(const struct pass *p, struct block *block, uint32_t source)
 {
 	struct transport *t = p->t;
-	struct block *block = &t->block[b];
-	uint64_t end = f->block_start[local + 1], run = block->run;
+	struct landing l = land(t, block);
+	struct ff_span piece;
+	uint64_t plain = block->run, special = block->special, at = plain;
+	uint32_t target, last = UINT32_MAX;
 
-	for (uint64_t i = f->block_start[local], next; i < end; i = next, run++) {
-		struct run *r = &t->run[run];
-		next = run_end(t, f, i, end);
-		*r = (struct run){ entry_target(t, f, i), (uint32_t)(next - i), FF_NO_ROW, 0, i, 0 };
-		for (uint64_t k = i; k < next; k++)
-			r->sum += ff_value(f, k);
-		block->sum += r->sum;
-		if (p->has_lobe[r->target])
-			r->link = find_link(t, p->link, r->target, source, block->chain,
-			                    arrival(f, local, r->target), &r->guessed);
+	while (next_piece(&l, &piece, &target)) {
+		if (target != last) {
+			at = p->is_special[target] ? special++ : plain++;
+			t->run_target[at] = target;
+			if (p->is_special[target])
+				t->run_link[block->link + (at - block->special)] =
+					find_link(t, p->link, block, target, source);
+		}
+		last = target;
+		t->run_sum[at] = sum_values(l.f, &piece, t->run_sum[at]);
 	}
+	for (uint64_t i = block->run; i < block[1].run; i++)
+		block->sum += t->run_sum[i];
 	block->sum += block->escape + block->black + block->lost + block->cut;
 }
 
-static void do_rows(void *arg, size_t begin, size_t end, int thread)
+static void count_rows(void *arg, size_t begin, size_t end, int thread)
+{
+	const struct pass *p = arg;
+	struct transport *t = p->t;
+
+	(void)thread;
+	for (uint64_t b = t->row_block[begin]; b < t->row_block[end]; b++)
+		count_runs(p, &t->block[b]);
+}
+
+static void fill_rows(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct pass *p = arg;
 	struct transport *t = p->t;
 
 	(void)thread;
 	for (size_t r = begin; r < end; r++)
-		for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++) {
-			uint32_t shard = t->block[b].shard;
-			const struct ff *f = t->shard[shard];
-			size_t local = b - p->first_block[shard];
-			if (p->fill) {
-				fill_block(p, f, local, b, t->row_side[r]);
-				continue;
-			}
-			for (uint64_t i = f->block_start[local]; i < f->block_start[local + 1];) {
-				i = run_end(t, f, i, f->block_start[local + 1]);
-				t->block[b].run++; /* a count until the sums are taken */
-			}
-		}
+		for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
+			fill_runs(p, &t->block[b], t->row_side[r]);
 }
 
-static int make_runs(struct pass *p, int threads, struct err *e)
+/* Counts in run and link become firsts. */
+static void number_runs(struct transport *t)
 {
-	struct transport *t = p->t;
-	uint64_t at = 0;
-
-	par_for(t->rows, 64, threads, do_rows, p, NULL);
 	for (size_t b = 0; b <= t->blocks; b++) {
-		uint64_t n = t->block[b].run;
-		t->block[b].run = at;
-		at += n;
+		struct block *block = &t->block[b];
+		uint64_t n = block->run, special = block->link;
+		block->run = t->runs;
+		block->link = t->special_runs;
+		block->special = t->runs + n - special;
+		t->runs += n;
+		t->special_runs += special;
 	}
-	t->runs = at;
-	if (!(t->run = mem_new(at, sizeof *t->run, "form factors by patch", e)))
-		return -1;
-	p->fill = 1;
-	par_for(t->rows, 64, threads, do_rows, p, NULL);
-	return 0;
+}
+
+static int make_runs(struct transport *t, const struct link_key *link, int threads,
+                     struct err *e)
+{
+	struct pass p = { t, link, mem_new(2 * t->m->patches, 1, what, e) };
+
+	if (p.is_special) {
+		mark_special(t, p.is_special);
+		par_for(t->rows, 64, threads, count_rows, &p, NULL);
+		number_runs(t);
+		t->run_target = mem_new(t->runs, sizeof *t->run_target, what, e);
+		t->run_sum = mem_new(t->runs, sizeof *t->run_sum, what, e);
+		t->run_link = mem_new(t->special_runs, sizeof *t->run_link, what, e);
+	}
+	int bad = !t->run_target || !t->run_sum || !t->run_link;
+	if (!bad)
+		par_for(t->rows, 64, threads, fill_rows, &p, NULL);
+	free(p.is_special);
+	return bad ? -1 : 0;
 }
 
 static int join(struct transport *t, int threads, struct err *e)
 {
 	size_t row = 0, block = 0, link = 0;
 	struct link_key *l = mem_new(t->links, sizeof *l, "links", e);
-	size_t *first = mem_new(t->shards, sizeof *first, "shards", e);
-	uint8_t *has_lobe = mem_new(2 * t->m->patches, 1, "patch flags", e);
-	struct pass p = { .t = t, .link = l, .has_lobe = has_lobe };
-	int bad = !l || !first || !has_lobe;
+	int bad = !l;
 
 	for (uint32_t i = 0; !bad && i < t->shards; i++) {
 		uint32_t *chain = common_chains(t, t->shard[i], e);
 		if ((bad = !chain))
 			break;
-		first[i] = block;
 		put_rows(t, i, chain, row, block);
 		put_links(t->shard[i], chain, (uint32_t)row, l + link);
 		row += t->shard[i]->rows;
@@ -320,14 +411,9 @@ static int join(struct transport *t, int threads, struct err *e)
 	if (!bad) {
 		chains_tie(&t->chains);
 		sort_links(t, l);
-		p.first_block = first;
-		for (uint32_t ps = 0; ps < 2 * t->m->patches; ps++)
-			has_lobe[ps] = t->target_link[ps + 1] > t->target_link[ps];
-		bad = make_runs(&p, threads, e);
+		bad = make_runs(t, l, threads, e);
 	}
 	free(l);
-	free(first);
-	free(has_lobe);
 	return bad ? -1 : 0;
 }
 
@@ -346,8 +432,8 @@ int transport_init(struct transport *t, const struct model *m, const struct ff *
 void transport_free(struct transport *t)
 {
 	void *array[] = { t->row_side, t->row_kind, t->row_samples, t->row_block,
-		t->diffuse_row, t->emission_row, t->block, t->run, t->link_target, t->link_row,
-		t->target_link };
+		t->diffuse_row, t->emission_row, t->block, t->run_target, t->run_sum, t->run_link,
+		t->link_target, t->link_row, t->target_link };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);

@@ -7,23 +7,23 @@
 #include "ff.h"
 #include "model.h"
 
-/* The entries of a block that lie on one patch-side. */
-struct run {
-	uint32_t target;     /* patch-side */
-	uint32_t count;      /* entries */
-	uint32_t link;       /* of a target with a lobe, else FF_NO_ROW */
-	uint32_t guessed;    /* 1: the link is the nearest in direction, not the source's */
-	uint64_t first;      /* entry, in the shard's numbering */
-	double sum;          /* of the values */
-};
-
+/* What comes in by one chain, and where it lands: runs, one for each patch-side, in
+ * two stretches by kind of side, ascending in each. Sides that do no more than absorb
+ * and reflect diffusely come first; the runs of the others, which send light through,
+ * by a lobe or by an ideal event, have a link beside. */
 struct block {
-	uint32_t chain;
-	uint32_t shard;
+	uint32_t chain, shard;
+	uint64_t local;      /* its number in the shard */
 	uint64_t run;        /* first; ends where the next block's begins */
+	uint64_t special;    /* first run of the second stretch */
+	uint64_t link;       /* run_link of that run */
 	double sum;          /* runs + the rest below: what comes in by this chain */
 	double escape, black, lost, cut;
 };
+
+/* A run_link: the link, with the bit set if it is the nearest in direction and not the
+ * source's, or FF_NO_ROW on a side without. */
+#define RUN_GUESSED 0x80000000u
 
 struct transport {
 	const struct model *m;
@@ -38,15 +38,16 @@ struct transport {
 	uint64_t *row_block;             /* [rows+1] */
 	uint32_t *diffuse_row, *emission_row; /* [2P], FF_NO_ROW where there is none */
 
-	size_t blocks, runs;
+	size_t blocks, runs, special_runs;
 	struct block *block;             /* [blocks+1] */
-	struct run *run;
+	uint32_t *run_target;            /* [runs] patch-side */
+	double *run_sum;                 /* [runs] of the values */
+	uint32_t *run_link;              /* [special_runs] */
 
 	size_t links;                    /* sorted by target, chain, source */
 	uint32_t *link_target;
 	uint32_t *link_row;              /* [links][2] */
 	uint64_t *target_link;           /* [2P+1] first link of a patch-side */
-	size_t entries;
 };
 
 /* Joins the shards (f[i] stay with the caller and must outlive t). They must be

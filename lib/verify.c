@@ -26,23 +26,31 @@ struct pairs {
 };
 
 /* Entries come ordered by patch-side: equal columns are neighbours. */
+static int sum_entry(struct pairs *p, uint64_t first, uint32_t at, double value, struct err *e)
+{
+	uint32_t *column = p->column.data;
+
+	if (at == FF_NO_ROW)
+		return 0;
+	if (p->column.n > first && column[p->column.n - 1] == at) {
+		((double *)p->value.data)[p->value.n - 1] += value;
+		return 0;
+	}
+	return vec_append(&p->column, &at, 1, sizeof at, e) ||
+	       vec_append(&p->value, &value, 1, sizeof value, e) ? -1 : 0;
+}
+
 static int sum_row(struct pairs *p, uint32_t r, struct err *e)
 {
 	const struct ff *f = p->pm.f;
-	const uint64_t b = f->row_block[r], first = p->column.n;
+	const uint64_t first = p->column.n;
+	struct ff_span s;
 
-	for (uint64_t k = f->block_start[b]; k < f->block_start[b + 1]; k++) {
-		uint32_t at = p->pm.place[f->column[k]];
-		double value = f->row_scale[r] * ff_value(f, k);
-		uint32_t *column = p->column.data;
-		if (at == FF_NO_ROW)
-			continue;
-		if (p->column.n > first && column[p->column.n - 1] == at)
-			((double *)p->value.data)[p->value.n - 1] += value;
-		else if (vec_append(&p->column, &at, 1, sizeof at, e) ||
-		         vec_append(&p->value, &value, 1, sizeof value, e))
-			return -1;
-	}
+	for (struct ff_cursor c = ff_begin(f, f->row_block[r]); ff_next(&c, &s);)
+		for (uint32_t k = 0; k < s.count; k++)
+			if (sum_entry(p, first, p->pm.place[s.column + 2 * k],
+			              f->row_scale[r] * ff_value(f, s.entry + k), e))
+				return -1;
 	return 0;
 }
 

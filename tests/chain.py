@@ -47,11 +47,10 @@ def run(tool, *arguments, expect=0, seconds=600):
 
 
 def container(path):
-    """The metadata and arrays of a .mesh, .ff or .rad file."""
-    with open(path, "rb") as f:
-        data = f.read()
+    """The metadata and arrays of a .mesh, .ff or .rad file, mapped from the file."""
+    data = np.memmap(path, np.uint8, "r")
     size, = struct.unpack("<Q", data[:8])
-    header = json.loads(data[8:8 + size])
+    header = json.loads(data[8:8 + size].tobytes())
     meta = header.pop("__metadata__")
     arrays = {name: np.frombuffer(data[8 + size + a["data_offsets"][0]:8 + size + a["data_offsets"][1]],
                                   DTYPES[a["dtype"]]).reshape(a["shape"])

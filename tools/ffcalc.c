@@ -157,7 +157,7 @@ static void print_report(const struct ff_stats *s, const struct request *r, doub
 static int compute(struct cli *c, const struct request *r, const struct model *m,
                    struct cache_info *info, struct err *e)
 {
-	struct ff_writer *w = ff_file_create(r->output, m, r->ff.f64, e);
+	struct ff_writer *w = ff_file_create(r->output, m, r->ff.f64, 0, e);
 	struct ff_sink sink = { put, w };
 	struct ff_stats stats;
 	struct ff whole = { 0 };

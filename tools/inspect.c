@@ -431,6 +431,29 @@ static int patch_matrix(const struct request *r, struct content *x, struct err *
 	return failed;
 }
 
+/* A block's entries; a file to patches has no elements to name. */
+static void print_entries(const struct ff_file *ff, char *const *name, uint32_t row, uint64_t b)
+{
+	const struct ff *f = &ff->f;
+	const uint32_t *start = ff->scene.patch_start;
+	uint32_t patch = 0;
+	struct ff_span s;
+
+	for (struct ff_cursor c = ff_begin(f, b); ff_next(&c, &s);)
+		for (uint32_t k = 0; k < s.count; k++) {
+			uint32_t column = s.column + 2 * k, receiver = column >> 1;
+			if (!f->to_patches && receiver < start[patch])
+				patch = 0; /* the back's entries of a patch follow the front's */
+			while (!f->to_patches && receiver >= start[patch + 1])
+				patch++;
+			printf("%" PRIu32 ",", f->block_chain[b]);
+			csv_text(name[f->to_patches ? column : 2 * patch + (column & 1)], ",");
+			if (!f->to_patches)
+				printf("%" PRIu32, receiver);
+			printf(",%.17g\n", f->row_scale[row] * ff_value(f, s.entry + k));
+		}
+}
+
 static void print_block_lines(const struct ff_file *ff, char *const *name, uint32_t row,
                               uint64_t b)
 {
@@ -440,18 +463,8 @@ static void print_block_lines(const struct ff_file *ff, char *const *name, uint3
 		double value;
 	} rest[] = { { "escape", f->block_escape[b] }, { "black", f->block_black[b] },
 	             { "lost", f->block_lost[b] }, { "cut", f->block_cut[b] } };
-	uint32_t patch = 0;
 
-	for (uint64_t k = f->block_start[b]; k < f->block_start[b + 1]; k++) {
-		uint32_t element = f->column[k] >> 1;
-		if (element < ff->scene.patch_start[patch])
-			patch = 0; /* the back's entries of a patch follow the front's */
-		while (element >= ff->scene.patch_start[patch + 1])
-			patch++;
-		printf("%" PRIu32 ",", f->block_chain[b]);
-		csv_text(name[2 * (size_t)patch + (f->column[k] & 1)], "");
-		printf(",%" PRIu32 ",%.17g\n", element, f->row_scale[row] * ff_value(f, k));
-	}
+	print_entries(ff, name, row, b);
 	for (size_t i = 0; i < sizeof rest / sizeof *rest; i++)
 		if (rest[i].value > 0)
 			printf("%" PRIu32 ",%s,,%.17g\n", f->block_chain[b], rest[i].where,

@@ -298,7 +298,8 @@ static void print_report(const struct job *j)
 		       r->guessed);
 	fprintf(out, "seconds       %.3f join, %.3f shoot, %.3f elements (%.2f GB/s of form factors)\n",
 	       j->prepare_seconds, j->solve_seconds, j->gather_seconds,
-	       r->gather_bytes / j->gather_seconds * 1e-9);
+	       (r->solve_bytes + r->gather_bytes) /
+	       (j->solve_seconds + j->gather_seconds) * 1e-9);
 	fprintf(out, "peak memory   %.0f MB\n", cli_peak_megabytes());
 }
 

@@ -76,7 +76,7 @@ static void write_rad(void)
 static int try_write_ff(const struct ff *f, struct err *e)
 {
 	const uint64_t blocks[] = { 0, 1 }, entries[] = { 0, 2 }, arrivals[] = { 0, 0 };
-	struct ff_writer *w = ff_file_create(ff_path, &model, 0, e);
+	struct ff_writer *w = ff_file_create(ff_path, &model, 0, 0, e);
 
 	if (!w)
 		return -1;

@@ -1,0 +1,27 @@
+/* What a .ff file makes of a batch's columns (private to the writer). */
+#ifndef TWOPASS_FF_FILE_PACK_H
+#define TWOPASS_FF_FILE_PACK_H
+
+#include "../lib/ff.h"
+#include "../lib/mem.h"
+#include "../lib/model.h"
+
+/* Scratch, begin with {0}; release with ff_packed_free. */
+struct ff_packed {
+	struct vec word, word_start;                 /* uint32_t, uint64_t */
+	struct vec column, value, start, scale;      /* of a batch summed by patch */
+};
+
+void ff_packed_free(struct ff_packed *p);
+
+/* The words of a batch of lists, which become spans in each block where that takes
+ * fewer: p->word, and p->word_start [blocks+1] from 0. O(entries). 0, or -1 and e. */
+int ff_pack_columns(const struct ff *batch, struct ff_packed *p, struct err *e);
+
+/* Turns a batch of lists of element-sides into one of patch-sides: values are summed,
+ * and row scales made to fit them after rounding. *out borrows the batch's other
+ * arrays and p's. O(entries). 0, or -1 and e. */
+int ff_sum_by_patch(const struct ff *batch, const struct model *m, struct ff_packed *p,
+                    struct ff *out, struct err *e);
+
+#endif
