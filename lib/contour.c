@@ -25,7 +25,7 @@ double contour_point(const double x[3], const double normal[3], int n, const dou
 			sum += v3_dot(c, normal) / s * atan2(s, v3_dot(a, b));
 		memcpy(a, b, sizeof a);
 	}
-	return sum / (2 * PI);
+	return -sum / (2 * PI);
 }
 
 /* ---- the integral of ln r over a pair of edges ---- */

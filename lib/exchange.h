@@ -3,6 +3,7 @@
 #ifndef TWOPASS_EXCHANGE_H
 #define TWOPASS_EXCHANGE_H
 
+#include "clear.h"
 #include "facet_set.h"
 #include "occluded.h"
 #include "ray.h"
@@ -25,10 +26,9 @@ struct exchanger {
 	const struct body_set *bodies;
 	struct ray_scene *rays;               /* for crowded pairs */
 	const double *centre;                 /* what facets are relative to */
-	double reach[CUBATURE_LEVELS];
+	struct clear clear;
 	struct sight_line sight;
 	struct occluded occluded;
-	double points[2][4][FACET_CORNERS * 18];
 	struct exchange_counts counts;
 };
 
@@ -41,10 +41,5 @@ void exchanger_free(struct exchanger *x);
  * absolute error. NaN and e when memory is short. */
 double exchange(struct exchanger *x, const struct facet_set *a, uint32_t i,
                 const struct facet_set *b, uint32_t j, double *error, struct err *e);
-
-/* The same with nothing between; the facets lie in front of one another. pa, pb: stored
- * points of them, or NULL. */
-double exchange_clear(struct exchanger *x, const struct facet *a, const struct cubature *pa,
-                      const struct facet *b, const struct cubature *pb);
 
 #endif

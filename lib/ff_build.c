@@ -6,6 +6,7 @@
 
 #include "bsdf.h"
 #include "ff_job.h"
+#include "ff_matrix.h"
 #include "vec3.h"
 
 enum { PATCHES_AT_A_TIME = 64, SOBOL_POINTS_MAX = 1 << 16 };
@@ -180,7 +181,7 @@ static void do_patches(void *arg, size_t begin, size_t end, int thread)
 	}
 }
 
-static void count(struct ff_stats *s, const struct ff *f)
+void ff_count(struct ff_stats *s, const struct ff *f)
 {
 	for (size_t r = 0; r < f->rows; r++) {
 		double cut = 0;
@@ -215,7 +216,7 @@ static int emit(struct run *r, size_t n, struct chains *whole, struct ff_stats *
 			bad = batch_renumber(b, &t->tally.chains, &t->chain_map, whole, e);
 			struct ff f = batch_view(b);
 			if (!bad)
-				count(stats, &f);
+				ff_count(stats, &f);
 			bad = bad || sink->put(sink->arg, &f, e);
 		}
 		batch_free(b);
@@ -302,7 +303,11 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 		bad = thread_init(&run.thread[t], &job, e);
 	for (size_t i = 0; !bad && i < PATCHES_AT_A_TIME; i++)
 		run.batch[i].f64 = o->f64;
-	bad = bad || all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats,
+	if (!bad && o->method == FF_ANALYTIC)
+		bad = ff_matrix(&job, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
+		      put_chains(whole, &chains, e);
+	else
+		bad = bad || all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats,
 	                         sink, progress, e) || put_chains(whole, &chains, e);
 	for (int t = 0; run.thread && t < threads; t++) {
 		stats->rays += run.thread[t].rays;

@@ -7,7 +7,7 @@
 #include "model.h"
 #include "par.h"
 
-enum ff_method { FF_RAYS, FF_HEMICUBE };
+enum ff_method { FF_RAYS, FF_HEMICUBE, FF_ANALYTIC };
 
 struct ff_options {
 	enum ff_method method;
@@ -17,6 +17,9 @@ struct ff_options {
 	uint32_t lobe_rays;   /* rays spent on the G rows of a patch-side and lobe */
 	uint32_t depth;       /* longest chain of ideal events followed */
 	uint64_t seed;
+	double target;        /* analytic: absolute error of a partly hidden factor */
+	int evaluations;      /* analytic: the most spent on one */
+	int to_patches;       /* columns are patch-sides */
 	int f64;
 	uint32_t part, parts; /* 1-based shard */
 	int threads;
@@ -30,6 +33,9 @@ struct ff_stats {
 	double worst_residual;/* largest |raw 1 - sum| of a row */
 	double mean_error;    /* mean and largest standard error of the diffuse rows */
 	double worst_error;
+	double pairs[4];      /* analytic: of facets, nothing between; hidden; partly hidden;
+	                         with a crowd between, sampled */
+	double evaluations;
 	double cut;           /* largest fraction of a row cut at the depth limit */
 	double trace_seconds; /* filled in by the caller */
 };

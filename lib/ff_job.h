@@ -95,6 +95,9 @@ void ff_batch_origins(const struct ff_job *j, uint32_t patch_side, uint32_t n,
 void ff_batch_directions(const struct ff_job *j, uint32_t patch_side, uint32_t n,
                          struct ff_batch_rays *b);
 
+/* Adds a batch's rows to the statistics. */
+void ff_count(struct ff_stats *s, const struct ff *f);
+
 /* Unit normal of a side of an element. */
 void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3]);
 

@@ -26,16 +26,17 @@ static int none_above(const struct facet *f, const struct plane *p, double near)
 }
 
 /* Planes through an edge of f and a corner of g that have all of both behind them. */
-static void edge_planes(struct sight_line *l, const struct facet *f, const struct facet *g)
+static int edge_planes(const struct facet *f, const struct facet *g, double near,
+                       struct plane *shaft)
 {
-	double near = l->set->near;
+	int n = 0;
 
 	for (int i = 0; i < f->n; i++) {
 		const double *a = &f->v[3 * i], *b = &f->v[3 * ((i + 1) % f->n)];
 		double ab[3], ac[3];
 		v3_sub(b, a, ab);
-		for (int j = 0; j < g->n && l->planes < SIGHT_PLANES; j++) {
-			struct plane *p = &l->shaft[l->planes];
+		for (int j = 0; j < g->n; j++) {
+			struct plane *p = &shaft[n];
 			v3_sub(&g->v[3 * j], a, ac);
 			v3_cross(ab, ac, p->normal);
 			if (!(v3_normalise(p->normal) > 0))
@@ -47,17 +48,20 @@ static void edge_planes(struct sight_line *l, const struct facet *f, const struc
 				p->offset = -p->offset;
 			}
 			if (none_above(g, p, near) && none_above(f, p, near)) {
-				l->planes++;
+				n++;
 				break;
 			}
 		}
 	}
+	return n;
 }
 
-static void make_shaft(struct sight_line *l)
+int shaft_planes(const struct facet *f, const struct facet *g, double near,
+                 struct plane shaft[SHAFT_PLANES])
 {
-	edge_planes(l, l->a, l->b);
-	edge_planes(l, l->b, l->a);
+	int n = edge_planes(f, g, near, shaft);
+
+	return n + edge_planes(g, f, near, shaft + n);
 }
 
 /* ---- bodies in it ---- */
@@ -136,7 +140,7 @@ static int collect(struct sight_line *l)
 			if (apart(l, b->lo, b->hi) || behind_facet(s, b, l->a) || behind_facet(s, b, l->b))
 				continue;
 			if (!l->planes)
-				make_shaft(l);
+				l->planes = shaft_planes(l->a, l->b, s->near, l->shaft);
 			if (outside_shaft(l, b))
 				continue;
 			if (l->bodies == SIGHT_BLOCKERS)

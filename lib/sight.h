@@ -5,7 +5,8 @@
 #include "body.h"
 #include "facet.h"
 
-enum { SIGHT_BLOCKERS = 48, SIGHT_PLANES = 160, BLOCKER_EDGES = BODY_EDGES + BODY_FACES };
+enum { SIGHT_BLOCKERS = 48, SHAFT_PLANES = 2 * FACET_CORNERS,
+       BLOCKER_EDGES = BODY_EDGES + BODY_FACES };
 
 enum sight {
 	SIGHT_CLEAR,          /* nothing: every point of one sees every point of the other */
@@ -28,7 +29,7 @@ struct blocker {
 struct sight_line {
 	const struct body_set *set;
 	const struct facet *a, *b;
-	struct plane shaft[SIGHT_PLANES]; /* hold both facets on or behind them */
+	struct plane shaft[SHAFT_PLANES];
 	int planes;
 	double lo[3], hi[3];      /* box of both */
 	uint32_t body[SIGHT_BLOCKERS];
@@ -39,6 +40,11 @@ struct sight_line {
  * may hide something are in l->body. O(log bodies + bodies between x corners). */
 enum sight sight_find(struct sight_line *l, const struct body_set *set, const struct facet *a,
                       const struct facet *b);
+
+/* Planes that have both facets on or behind them, through an edge of one and a corner of
+ * the other. Returns their number. */
+int shaft_planes(const struct facet *f, const struct facet *g, double near,
+                 struct plane shaft[SHAFT_PLANES]);
 
 /* The part of a body in front of the plane of facet b into `out`. 0 if nothing is. */
 int blocker_make(const struct body_set *s, uint32_t body, const struct facet *b,

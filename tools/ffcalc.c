@@ -13,13 +13,15 @@
 #include "../lib/ff_build.h"
 #include "common/cli.h"
 
-enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GAIN };
+enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GAIN, OPT_TO };
 
 static const struct cli_option options[] = {
 	{ 'o', "output", "FILE", "write the form factors to FILE (.ff)" },
-	{ 'm', "method", "METHOD", "rays or hemicube (default rays)" },
+	{ 'm', "method", "METHOD", "rays, hemicube or analytic (default rays)" },
 	{ 'n', "samples", "N", "rays a patch-side (default 4096), or pixels along a hemicube's edge (64)" },
 	{ 'p', "points", "N", "hemicubes a patch-side (default 16)" },
+	{ 't', "target", "X", "analytic: absolute error of a factor that is partly hidden (default 1e-6)" },
+	{ OPT_TO, "to", "WHAT", "elements or patches: what receives (default elements)" },
 	{ OPT_GAIN, "emitter-gain", "N", "times as many rays for emitters (default 8)" },
 	{ OPT_LOBE_RAYS, "lobe-rays", "N", "rays a patch-side for each directional lobe (default 4096)" },
 	{ OPT_DEPTH, "depth", "N", "most ideal mirrors and panes a ray is followed through (default 256)" },
@@ -53,18 +55,31 @@ static void parse_word(const struct cli *c, const char *option, const char *text
 	*value = strcmp(text, yes) == 0;
 }
 
+static const char *const method_name[] = { "rays", "hemicube", "analytic" };
+
+static enum ff_method parse_method(const struct cli *c, const char *text)
+{
+	for (int i = 0; i < 3; i++)
+		if (strcmp(text, method_name[i]) == 0)
+			return (enum ff_method)i;
+	cli_usage(c, "--method %s: must be rays, hemicube or analytic", text);
+	return FF_RAYS;
+}
+
 static void parse(struct cli *c, int argc, char **argv, struct request *r)
 {
-	int letter, hemicube = 0;
+	int letter;
 	long n = 0;
 	struct ff_options *o = &r->ff;
 
 	*o = (struct ff_options){ .points = 16, .emitter_gain = 8, .lobe_rays = 4096, .depth = 256,
-	                          .seed = 1, .part = 1, .parts = 1 };
+	                          .seed = 1, .target = 1e-6, .evaluations = 20000, .part = 1, .parts = 1 };
 	while ((letter = cli_next(c, argc, argv)) != -1) {
 		switch (letter) {
 		case 'o': r->output = optarg; break;
-		case 'm': parse_word(c, "--method", optarg, "hemicube", "rays", &hemicube); break;
+		case 'm': o->method = parse_method(c, optarg); break;
+		case 't': o->target = cli_number(c, "--target", optarg, 1e-12, 1); break;
+		case OPT_TO: parse_word(c, "--to", optarg, "patches", "elements", &o->to_patches); break;
 		case 'n': n = cli_integer(c, "--samples", optarg, 4, 1 << 26); break;
 		case 'p': o->points = (uint32_t)cli_integer(c, "--points", optarg, 1, 4096); break;
 		case OPT_GAIN: o->emitter_gain = (uint32_t)cli_integer(c, "--emitter-gain", optarg, 1, 4096); break;
@@ -80,7 +95,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 	if (!r->output)
 		cli_usage(c, "an output is needed: -o FILE.ff");
 	r->mesh = argv[optind];
-	o->method = hemicube ? FF_HEMICUBE : FF_RAYS;
+	int hemicube = o->method == FF_HEMICUBE;
 	o->rays = n ? (uint32_t)n : hemicube ? 64 : 4096;
 	if (hemicube && (o->rays % 2 || o->rays > 8192))
 		cli_usage(c, "--samples %u: a hemicube's resolution is even and at most 8192", o->rays);
@@ -92,13 +107,17 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 static json_t *options_json(const struct ff_options *o)
 {
 	json_t *j = json_pack("{s:s, s:I, s:I, s:I, s:I, s:s, s:I, s:I}",
-		"method", o->method == FF_HEMICUBE ? "hemicube" : "rays",
+		"method", method_name[o->method],
 		"samples", (json_int_t)o->rays, "lobe_rays", (json_int_t)o->lobe_rays,
 		"depth", (json_int_t)o->depth, "seed", (json_int_t)o->seed,
 		"precision", o->f64 ? "f64" : "f32",
 		"part", (json_int_t)o->part, "parts", (json_int_t)o->parts);
 
 	json_object_set_new(j, "emitter_gain", json_integer(o->emitter_gain));
+	if (o->to_patches)
+		json_object_set_new(j, "to", json_string("patches"));
+	if (o->method == FF_ANALYTIC)
+		json_object_set_new(j, "target", json_real(o->target));
 	if (o->method == FF_HEMICUBE)
 		json_object_set_new(j, "points", json_integer(o->points));
 	return j;
@@ -145,6 +164,10 @@ static void print_report(const struct ff_stats *s, const struct request *r, doub
 	fprintf(out, "rays          %.0f (%.2f Mray/s)\n", s->rays, s->rays / seconds * 1e-6);
 	if (r->ff.method == FF_HEMICUBE)
 		fprintf(out, "pixels        %.0f (%.2f Mpixel/s)\n", s->samples, s->samples / seconds * 1e-6);
+	if (r->ff.method == FF_ANALYTIC)
+		fprintf(out, "pairs         %.0f clear, %.0f hidden, %.0f partly (%.1f evaluations each), "
+		        "%.0f sampled\n", s->pairs[0], s->pairs[1], s->pairs[2],
+		        s->evaluations / fmax(1, s->pairs[2]), s->pairs[3]);
 	fprintf(out, "row sums      within %.3g of 1 before scaling\n", s->worst_residual);
 	fprintf(out, "row error     %.3g mean, %.3g worst (standard error, root of squares over receivers)\n",
 	       s->mean_error, s->worst_error);
@@ -157,7 +180,7 @@ static void print_report(const struct ff_stats *s, const struct request *r, doub
 static int compute(struct cli *c, const struct request *r, const struct model *m,
                    struct cache_info *info, struct err *e)
 {
-	struct ff_writer *w = ff_file_create(r->output, m, r->ff.f64, 0, e);
+	struct ff_writer *w = ff_file_create(r->output, m, r->ff.f64, r->ff.to_patches, e);
 	struct ff_sink sink = { put, w };
 	struct ff_stats stats;
 	struct ff whole = { 0 };

@@ -1,0 +1,293 @@
+#include "ff_matrix.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "exchange.h"
+#include "ff_exact.h"
+#include "lobe.h"
+#include "vec3.h"
+
+enum { BAND_BYTES = 192 << 20, ROWS_AT_A_TIME = 64, TILE = 32, REST_RAYS = 256 };
+
+/* A factor whose error is not just the relative one of all. */
+struct doubt {
+	uint32_t i, j;                /* sides, i < j */
+	double error;                 /* of the exchange area */
+};
+
+struct thread {
+	struct exchanger x;
+	struct vec doubt;             /* struct doubt */
+	struct err e;
+};
+
+struct matrix {
+	const struct ff_job *job;
+	uint32_t *side;               /* [n] modelled patch-sides */
+	size_t n;
+	double *area;                 /* [n] */
+	struct facet_set facets;
+	struct body_set bodies;
+	double centre[3];
+	struct thread *thread;
+	/* The band in work: rows [first, first + rows), all columns. */
+	size_t first, rows;
+	float *e32;                   /* [rows][n] exchange areas, one of them */
+	double *e64;
+	double *variance;             /* [rows] sum of squared errors of exchange areas */
+};
+
+static double get(const struct matrix *m, size_t row, size_t j)
+{
+	return m->e32 ? (double)m->e32[row * m->n + j] : m->e64[row * m->n + j];
+}
+
+static void set(struct matrix *m, size_t row, size_t j, double x)
+{
+	if (m->e32)
+		m->e32[row * m->n + j] = (float)x;
+	else
+		m->e64[row * m->n + j] = x;
+}
+
+/* ---- exchange areas ---- */
+
+/* Of two sides: the sum over their facets, in the same order whichever is asked for. */
+static double pair(struct matrix *m, struct thread *t, size_t a, size_t b)
+{
+	size_t i = a < b ? a : b, j = a < b ? b : a;
+	const uint32_t *start = m->facets.start;
+	uint32_t p = m->side[i], q = m->side[j];
+	double sum = 0, error = 0, off;
+
+	for (uint32_t f = start[p]; f < start[p + 1]; f++)
+		for (uint32_t g = start[q]; g < start[q + 1]; g++) {
+			sum += exchange(&t->x, &m->facets, f, &m->facets, g, &off, &t->e);
+			error += off;
+		}
+	if (error > 2 * t->x.o.relative * sum) {
+		struct doubt d = { (uint32_t)i, (uint32_t)j, error };
+		vec_append(&t->doubt, &d, 1, sizeof d, &t->e);
+	}
+	return sum;
+}
+
+/* A row of the band: what is right of the diagonal, and all outside the band. */
+static void do_rows(void *arg, size_t begin, size_t end, int thread)
+{
+	struct matrix *m = arg;
+	struct thread *t = &m->thread[thread];
+
+	for (size_t r = begin; r < end; r++) {
+		for (size_t j = 0; j < m->first; j++)
+			set(m, r, j, pair(m, t, m->first + r, j));
+		for (size_t j = m->first + r + 1; j < m->n; j++)
+			set(m, r, j, pair(m, t, m->first + r, j));
+	}
+}
+
+/* Left of the diagonal, by tiles: from the other half. */
+static void mirror(struct matrix *m)
+{
+	for (size_t a = 0; a < m->rows; a += TILE)
+		for (size_t b = 0; b <= a; b += TILE)
+			for (size_t i = a; i < a + TILE && i < m->rows; i++)
+				for (size_t j = b; j < b + TILE && j < i; j++)
+					set(m, i, m->first + j, get(m, j, m->first + i));
+}
+
+static int by_pair(const void *a, const void *b)
+{
+	const struct doubt *x = a, *y = b;
+
+	if (x->i != y->i)
+		return x->i < y->i ? -1 : 1;
+	return (x->j > y->j) - (x->j < y->j);
+}
+
+/* Squared errors by row, added up in an order that does not depend on threads. */
+static int gather_doubts(struct matrix *m, struct err *e)
+{
+	struct vec all = { 0 };
+	int bad = 0;
+
+	for (int t = 0; t < m->job->o.threads && !bad; t++) {
+		struct vec *v = &m->thread[t].doubt;
+		bad = m->thread[t].e.set ? err_set(e, "%s", m->thread[t].e.text)
+		                         : vec_append(&all, v->data, v->n, sizeof(struct doubt), e);
+		v->n = 0;
+	}
+	if (!bad && all.n)
+		qsort(all.data, all.n, sizeof(struct doubt), by_pair);
+	memset(m->variance, 0, m->rows * sizeof *m->variance);
+	for (size_t k = 0; !bad && k < all.n; k++) {
+		const struct doubt *d = (const struct doubt *)all.data + k;
+		const uint32_t end[2] = { d->i, d->j };
+		for (int s = 0; s < 2; s++)
+			if (end[s] >= m->first && end[s] < m->first + m->rows)
+				m->variance[end[s] - m->first] += d->error * d->error;
+	}
+	free(all.data);
+	return bad;
+}
+
+/* ---- rows ---- */
+
+/* What of a few rays from a side leaves the scene and meets black backs. */
+static void rest(const struct matrix *m, uint32_t ps, uint32_t *escapes, uint32_t *blacks)
+{
+	const struct ff_job *j = m->job;
+	uint64_t seed = rng_mix(j->o.seed ^ ((uint64_t)ps << 20));
+
+	*escapes = *blacks = 0;
+	for (uint32_t i = 0; i < REST_RAYS; i++) {
+		double x[3], n[3], dir[3], u[2] = { rng_sobol(i, 2, seed), rng_sobol(i, 3, seed) };
+		struct ray_hit hit;
+		uint32_t element = ff_point(j, ps >> 1, rng_sobol(i, 0, seed), rng_sobol(i, 1, seed), x);
+		ff_normal(j, element, (int)(ps & 1), n);
+		lobe_sample_cosine(n, u, dir);
+		ray_leave(j->rays, n, x);
+		ray_nearest(j->rays, x, dir, &hit);
+		if (hit.triangle == RAY_MISS)
+			++*escapes;
+		else
+			*blacks += j->is_black[2 * (j->m->element_patch[locate(&j->locator, hit.triangle, hit.w)]) +
+			                       (uint32_t)hit.side];
+	}
+}
+
+static int put_row(struct ff_batch *b, const struct matrix *m, size_t r, struct err *e)
+{
+	uint32_t ps = m->side[m->first + r];
+	double area = m->area[m->first + r], sum = 0;
+	struct exact_row row = { .side = ps };
+
+	if (vec_reserve(&b->column, m->n, sizeof(uint32_t), e) ||
+	    vec_reserve(&b->value, m->n, b->f64 ? sizeof(double) : sizeof(float), e))
+		return -1;
+	for (size_t j = 0; j < m->n; j++) {
+		double x = get(m, r, j);
+		if (x > 0)
+			sum += batch_put_value(b, m->side[j], x / area);
+	}
+	row.error = sqrt(m->variance[r]) / area + m->thread[0].x.o.relative * sum;
+	row.residual = 1 - sum;
+	if (row.residual > 0) {
+		uint32_t escapes, blacks;
+		rest(m, ps, &escapes, &blacks);
+		if (escapes + blacks) {
+			row.escape = row.residual * escapes / (escapes + blacks);
+			row.black = row.residual * blacks / (escapes + blacks);
+			row.residual = 0;
+		}
+	}
+	row.scale = 1 / (sum + row.escape + row.black);
+	return batch_put_exact(b, &row, e);
+}
+
+static int emit(struct matrix *m, const struct ff_sink *sink, struct ff_stats *stats,
+                struct err *e)
+{
+	struct ff_batch b = { .f64 = m->job->o.f64 };
+	int bad = 0;
+
+	for (size_t r = 0; r < m->rows && !bad; r++) {
+		bad = put_row(&b, m, r, e);
+		if (bad || ((r + 1) % ROWS_AT_A_TIME && r + 1 < m->rows))
+			continue;
+		struct ff f = batch_view(&b);
+		f.to_patches = 1;
+		ff_count(stats, &f);
+		bad = sink->put(sink->arg, &f, e);
+		batch_free(&b);
+	}
+	batch_free(&b);
+	return bad;
+}
+
+/* ---- bands ---- */
+
+static int bands(struct matrix *m, size_t begin, size_t end, const struct ff_sink *sink,
+                 struct ff_stats *stats, const struct progress *progress, struct err *e)
+{
+	size_t size = m->job->o.f64 ? sizeof(double) : sizeof(float), at;
+	size_t most = BAND_BYTES / size / (m->n + 1);
+
+	most = most < 1 ? 1 : most < end - begin ? most : end - begin;
+	void *room = mem_new(most * m->n, size, "exchange areas", e);
+	m->variance = mem_new(most, sizeof *m->variance, "exchange areas", e);
+	if (!room || !m->variance) {
+		free(room);
+		return -1;
+	}
+	*(m->job->o.f64 ? (void **)&m->e64 : (void **)&m->e32) = room;
+	int bad = 0;
+	for (at = begin; at < end && !bad; at += m->rows) {
+		m->first = at;
+		m->rows = end - at < most ? end - at : most;
+		if (at > begin)
+			memset(room, 0, most * m->n * size);
+		par_for(m->rows, 1, m->job->o.threads, do_rows, m, progress);
+		mirror(m);
+		bad = gather_doubts(m, e) || emit(m, sink, stats, e);
+	}
+	free(room);
+	return bad;
+}
+
+static int find_sides(struct matrix *m, struct err *e)
+{
+	const struct model *model = m->job->m;
+
+	m->side = mem_new(2 * model->patches, sizeof *m->side, "patch-sides", e);
+	m->area = mem_new(2 * model->patches, sizeof *m->area, "patch-sides", e);
+	if (!m->side || !m->area)
+		return -1;
+	for (uint32_t ps = 0; ps < 2 * model->patches; ps++)
+		if (model_side_modelled(model, ps)) {
+			m->area[m->n] = model->patch_area[ps >> 1];
+			m->side[m->n++] = ps;
+		}
+	return 0;
+}
+
+int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct ff_sink *sink,
+              struct ff_stats *stats, const struct progress *progress, struct err *e)
+{
+	struct matrix m = { .job = j };
+	struct exchange_options o = { .relative = j->o.f64 ? 1e-9 : 1e-7, .absolute = j->o.target,
+	                              .most = j->o.evaluations };
+	size_t a = 0, b;
+	int bad = find_sides(&m, e) || facet_set_init(&m.facets, j->m, FACETS_OF_PATCHES, e) ||
+	          body_set_init(&m.bodies, j->m, e);
+
+	facet_centre(j->m, m.centre);
+	m.thread = mem_new((size_t)j->o.threads, sizeof *m.thread, "threads", e);
+	bad = bad || !m.thread;
+	for (int t = 0; !bad && t < j->o.threads; t++)
+		exchanger_init(&m.thread[t].x, &o, &m.bodies, j->rays, m.centre);
+	while (a < m.n && m.side[a] < 2 * begin)
+		a++;
+	for (b = a; b < m.n && m.side[b] < 2 * end;)
+		b++;
+	bad = bad || bands(&m, a, b, sink, stats, progress, e);
+	for (int t = 0; m.thread && t < j->o.threads; t++) {
+		const struct exchange_counts *c = &m.thread[t].x.counts;
+		stats->pairs[0] += c->clear;
+		stats->pairs[1] += c->hidden;
+		stats->pairs[2] += c->partly;
+		stats->pairs[3] += c->crowded;
+		stats->evaluations += c->evaluations;
+		exchanger_free(&m.thread[t].x);
+		free(m.thread[t].doubt.data);
+	}
+	free(m.thread);
+	free(m.side);
+	free(m.area);
+	free(m.variance);
+	facet_set_free(&m.facets);
+	body_set_free(&m.bodies);
+	return bad ? -1 : 0;
+}
