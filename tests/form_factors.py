@@ -11,9 +11,9 @@ form_factors.py --tap     the same judged, with reciprocity and invariance, as T
 What counts as agreement (every value, no exceptions):
   analytic   1e-9 absolute and 1e-8 relative where nothing is between, else 1e-6
              absolute; reciprocity and invariance 1e-9 relative
-  others     q times the stated error or, if that is more, of one sample; q the two-sided 99 % point for all values of the
-             run (Bonferroni) of Student's t with 3 degrees of freedom, as the stated error is
-             the spread of four independent estimates
+  others     q times the stated error or, if that is more, the weight of one sample; q the
+             two-sided 99 % point for all values of the run (Bonferroni) of Student's t with 3
+             degrees of freedom: the stated error is the spread of four estimates
   rays       of all cases' errors, as many within Student's median of the stated error as
              a coin would bring in 999 of 1000 times: about half
 Invariance is the change of got / exact. What is exact for moved polygons is computed from
@@ -54,8 +54,9 @@ MEDIAN = 0.76489  # of |t|, 3 degrees of freedom
 class Case:
     def __init__(self, entry):
         self.id, self.exact = entry["id"], REAL(entry["F12"])
-        self.curved = None if entry["emitter"] is not None else "a point" if "emitter_point" in entry else "curved"
-        if self.curved:
+        self.curved = None
+        if entry["emitter"] is None:
+            self.curved = "a point" if "emitter_point" in entry else "curved"
             return
         self.emitter, self.receiver = polygon(entry["emitter"]), polygon(entry["receiver"])
         self.occluders = [polygon(p) for p in entry.get("occluders", ())]
