@@ -122,10 +122,7 @@ def outlines_of(mesh):
 
 def movements():
     """Name, change of the polygons, placement for a scene of a given size, flip."""
-    w, x, y, z = np.array([.4, .3, -.5, .7], REAL) / np.sqrt(REAL(99) / 100)
-    turn = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+    turn = random_polygons.turn_of(np.random.default_rng(1))
     same, still = lambda p: p, lambda size: Placement()
     far = lambda size: Placement(shift=2 ** (20 + math.ceil(math.log2(size))) * np.array([1, -2, 3]))
     yield "1e-6 times the size", same, lambda size: Placement(REAL("1e-6")), False
