@@ -47,7 +47,8 @@ def place(p):
     whether the two together are p."""
     best = None
     for frame in frames(p):
-        x = solve(frame, p - p[0]).astype(np.float32)
+        x = solve(frame, p - p[0])
+        x = np.where(abs(x - np.round(x)) < 1e-9, np.round(x), x).astype(np.float32)
         off = abs(x.astype(REAL) @ frame.T - (p - p[0])).max() / abs(p - p[0]).max()
         if best is None or off <= max(best[2], EXACT):
             best = x, frame, off

@@ -5,8 +5,8 @@ ff_scenes.py on one core and prints a markdown table.
 form_factors.py [--scene NAME]... [--run OPTIONS]...
 
   user, elapsed   seconds of the whole process, medians
-  of bare         elapsed, over what a bare Embree loop (build/bench/rays) takes for 4 M rays of
-                  the same mesh, run beside each; median of the ratios
+  of bare         user, over the processor seconds that a bare Embree loop (build/bench/rays)
+                  takes for 4 M rays of the same mesh, run beside each; median of the ratios
   memory          peak, MB
   bytes           of the file for each factor that is not 0
   row sums        largest |1 - sum| before scaling
@@ -83,10 +83,10 @@ class Scene:
         self.known = {}
 
     def bare(self):
-        """Seconds for BARE_RAYS."""
-        out = Measured(os.path.join(BUILD, "bench", "rays"), self.mesh, BARE_RAYS, 1).text
-        rate = dict(line.split() for line in out.splitlines())["mray_per_s"]
-        return BARE_RAYS / 1e6 / float(rate)
+        """Processor seconds for BARE_RAYS: those elapsed, by the share that others left."""
+        ran = Measured(os.path.join(BUILD, "bench", "rays"), self.mesh, BARE_RAYS, 1)
+        rate = dict(words.split() for words in ran.text.splitlines() if words)["mray_per_s"]
+        return BARE_RAYS / 1e6 / float(rate) * min(1, ran.user / ran.elapsed)
 
     def exact(self):
         _, a = container(self.mesh)
@@ -152,7 +152,7 @@ def row(scene, options, repeat):
             os.remove(ff)
         runs.append(Measured(os.path.join(BUILD, "ffcalc"), *options.split(), "-j", 1, "-q",
                              scene.mesh, "-o", ff))
-        ratios.append(runs[-1].elapsed / scene.bare())
+        ratios.append(runs[-1].user / scene.bare())
     median = lambda what: statistics.median(getattr(r, what) for r in runs)
     _, arrays = container(ff)
     factors, judged = arrays["value"].size, [""] * 4
