@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "contour.h"
 #include "cubature.h"
 #include "shadow.h"
 #include "vec3.h"
@@ -11,8 +12,16 @@
 struct cell {
 	double q[4][3];               /* convex, or a triangle with its last corner twice */
 	uint64_t blockers;            /* that may hide something from it */
+	double most;                  /* its exchange area if nothing were hidden */
 	double value, error;
 };
+
+/* What may be wrong with a cell, as a fraction of `most`: before it is compared with its
+ * quarters; where its points may all have missed the edge of a shadow; where its corners
+ * have, too, and known edges end it. */
+static const double unproved = .1, unseen = .02, unlikely = 1e-4;
+
+enum { HALVINGS = 5 };        /* of the facet seen, to prove that several blockers hide it */
 
 /* An integral over facet f of what it sees of g. */
 struct integral {
@@ -20,7 +29,9 @@ struct integral {
 	struct clear *clear;
 	const struct facet *f, *g;
 	double near;
+	struct shadows shadows;
 	double settled;               /* of cells that are exact */
+	int cut;                      /* cells end at the edges of shadows */
 	struct err *e;
 };
 
@@ -41,14 +52,16 @@ static struct facet cell_facet(const struct cell *c)
 }
 
 /* Settles a cell whose view is clear or hidden: 1. Otherwise narrows its blockers down. */
-static int settle(struct integral *in, struct facet *f, uint64_t *blockers)
+static int settle(struct integral *in, const struct facet *f, uint64_t *blockers, double *most)
 {
 	int hidden;
 
-	*blockers = shadow_on(in->o->seer.blocker, *blockers, f, in->g, in->near, &hidden);
-	if (!hidden && !*blockers)
-		in->settled += clear_exchange(in->clear, f, NULL, in->g, NULL);
-	return hidden || !*blockers;
+	*blockers = shadow_on(in->o->seer.blocker, &in->shadows, *blockers, f, in->g, in->near, &hidden);
+	if (hidden)
+		return 1;
+	*most = clear_exchange(in->clear, f, NULL, in->g, NULL);
+	in->settled += *blockers ? 0 : *most;
+	return !*blockers;
 }
 
 static void measure(const struct integral *in, struct cell *c)
@@ -64,6 +77,31 @@ static void measure(const struct integral *in, struct cell *c)
 		if (w[i] > 0)
 			c->value += w[i] * seen(&in->o->seer, at, in->f->normal, in->g, c->blockers, in->e);
 	}
+}
+
+/* A cell whose points see nothing, or all, though no one blocker hides it and some may: it
+ * is settled if together they hide it surely. 1 then. */
+static int settle_dark(const struct integral *in, const struct cell *c, const struct facet *f)
+{
+	return c->value == 0 &&
+	       blockers_hide(in->o->seer.blocker, c->blockers, f, in->g, in->near, HALVINGS);
+}
+
+/* The least error that a measured cell can claim: more where a corner sees what the points
+ * did not. */
+static double doubt(const struct integral *in, const struct cell *c)
+{
+	int dark = c->value == 0, bright = c->value >= (1 - 1e-9) * c->most;
+	double off = 0;
+
+	if (!in->cut || !(dark || bright))
+		return in->cut ? 0 : unseen * c->most;
+	for (int k = 0; k < 4; k++) {
+		double f = seen(&in->o->seer, c->q[k], in->f->normal, in->g, c->blockers, in->e);
+		double all = contour_point(c->q[k], in->f->normal, in->g->n, in->g->v);
+		off = fmax(off, dark ? f / all : 1 - f / all);
+	}
+	return c->most * (unlikely + unproved * off);
 }
 
 static void middle(const double a[3], const double b[3], double out[3])
@@ -101,38 +139,46 @@ static int refine(struct integral *in, size_t i)
 	for (int k = 0; k < 4; k++) {
 		struct facet f = cell_facet(&quarter[k]);
 		facet_measure(&f);
-		if (f.area == 0 || settle(in, &f, &quarter[k].blockers))
+		if (f.area == 0 || settle(in, &f, &quarter[k].blockers, &quarter[k].most))
 			continue;
 		measure(in, &quarter[k]);
 		sum += quarter[k].value;
-		quarter[left++] = quarter[k];
+		if (!settle_dark(in, &quarter[k], &f))
+			quarter[left++] = quarter[k];
 	}
 	/* A rule of fourth order leaves a fifteenth of the difference where what is seen is
 	 * smooth, a third across the edge of a shadow. */
+	double off = fabs(sum + in->settled - before - c.value) / (3 * left);
 	for (int k = 0; k < left; k++)
-		quarter[k].error = fabs(sum + in->settled - before - c.value) / (3 * left);
+		quarter[k].error = fmax(off, doubt(in, &quarter[k]));
 	return vec_append(cells, quarter, (size_t)left, sizeof *quarter, in->e);
 }
 
-static int put_cells(struct integral *in, struct facet *f, uint64_t blockers)
+static int put_cells(struct integral *in, const struct facet *f, uint64_t blockers)
 {
-	if (settle(in, f, &blockers))
+	double most;
+
+	if (settle(in, f, &blockers, &most))
 		return 0;
 	for (int i = 0; 2 * i + 3 <= f->n; i++) {
-		struct cell c = { .blockers = blockers, .error = INFINITY };
+		struct cell c = { .blockers = blockers, .most = most };
 		for (int k = 0; k < 4; k++) {
 			int corner = k == 0 ? 0 : 2 * i + k < f->n ? 2 * i + k : f->n - 1;
 			memcpy(c.q[k], &f->v[3 * corner], sizeof c.q[k]);
 		}
+		struct facet part = cell_facet(&c);
+		facet_measure(&part);
+		c.most *= part.area / f->area;
+		c.error = unproved * c.most;
 		measure(in, &c);
-		if (vec_append(&in->o->cell, &c, 1, sizeof c, in->e))
+		if (!settle_dark(in, &c, &part) && vec_append(&in->o->cell, &c, 1, sizeof c, in->e))
 			return -1;
 	}
 	return 0;
 }
 
 /* Cells between the cuts, each convex. */
-static int cut_cells(struct integral *in, struct facet *f, uint64_t blockers,
+static int cut_cells(struct integral *in, const struct facet *f, uint64_t blockers,
                      const struct plane *cuts, int n)
 {
 	struct facet_room low, high;
@@ -145,8 +191,6 @@ static int cut_cells(struct integral *in, struct facet *f, uint64_t blockers,
 			continue;
 		for (int k = 0; k < 3; k++)
 			back[k] = -p->normal[k];
-		if (settle(in, f, &blockers))
-			return 0;
 		return (facet_clip(f, p->normal, p->offset, &high) &&
 		        cut_cells(in, &high.f, blockers, cuts, n - 1)) ||
 		       (facet_clip(f, back, -p->offset, &low) &&
@@ -173,7 +217,7 @@ static double integrate(struct integral *in, double tolerance, int most, double 
 				worst = i;
 		}
 		*error = off;
-		if (!(off > tolerance) || (o->seer.evaluations >= stop && isfinite(off)))
+		if (!(off > tolerance) || o->seer.evaluations >= stop)
 			return sum;
 		if (refine(in, worst))
 			return NAN;
@@ -204,7 +248,6 @@ double occluded_exchange(struct occluded *o, struct clear *clear, const struct s
 {
 	struct integral in = { .o = o, .clear = clear, .f = l->a, .g = l->b, .near = l->set->near,
 	                       .e = e };
-	struct plane cuts[SHADOW_CUTS];
 
 	make_blockers(o, l, l->b);
 	if (clearance(o, l->a) < clearance(o, l->b)) {
@@ -214,10 +257,12 @@ double occluded_exchange(struct occluded *o, struct clear *clear, const struct s
 	}
 	o->seer.near = in.near;
 	o->cell.n = 0;
-	int n = shadow_cuts(o->seer.blocker, o->blockers, in.f, in.g, in.near, cuts);
 	uint64_t all = o->blockers ? UINT64_MAX >> (64 - o->blockers) : 0;
-	struct facet whole = *in.f;
-	if (cut_cells(&in, &whole, all, cuts, n))
+	/* Cutting pays where more is asked for than cells across shadows' edges can tell. */
+	in.cut = tolerance < 2 * unseen * clear_exchange(clear, in.f, NULL, in.g, NULL);
+	if (in.cut)
+		shadow_edges(o->seer.blocker, o->blockers, in.f, in.g, in.near, &in.shadows);
+	if (cut_cells(&in, in.f, all & ~in.shadows.idle, in.shadows.cut, in.shadows.cuts))
 		return NAN;
 	return integrate(&in, tolerance, most, error);
 }

@@ -8,14 +8,13 @@
 /* ---- cuts ---- */
 
 struct cuts {
-	const struct facet *f;
+	const struct facet *f, *g;
 	double near;
-	struct plane *cut;
-	int n;
+	struct shadows *s;
 };
 
-/* 1 if the corners are all on one side of a plane (on it counts as either). */
-static int one_side(const struct plane *p, const double *x, int n, int stride, double near)
+/* +1 if corners are all in front of a plane, -1 if behind, 0 if on both sides. */
+static int side_of(const struct plane *p, const double *x, int n, int stride, double near)
 {
 	int above = 0, below = 0;
 
@@ -24,21 +23,64 @@ static int one_side(const struct plane *p, const double *x, int n, int stride, d
 		above |= h > near;
 		below |= h < -near;
 	}
-	return !(above && below);
+	return above - below;
+}
+
+/* The same for a blocker: where its edges begin, and end. */
+static int blocker_side(const struct blocker *b, const struct plane *p, double near)
+{
+	const int stride = (int)(sizeof b->edge[0] / sizeof(double));
+	int begins = side_of(p, b->edge[0].a, b->edges, stride, near);
+	int ends = side_of(p, b->edge[0].b, b->edges, stride, near);
+
+	return begins == ends ? begins : 0;
 }
 
 static void add(struct cuts *c, const struct plane *p)
 {
-	double lowest, highest;
+	struct shadows *s = c->s;
 
-	facet_heights(c->f, p->normal, p->offset, &lowest, &highest);
-	if (lowest >= -c->near || highest <= c->near || c->n == SHADOW_CUTS)
+	if (s->cuts == SHADOW_CUTS)
 		return;
-	for (int i = 0; i < c->n; i++)
-		if (fabs(fabs(v3_dot(c->cut[i].normal, p->normal)) - 1) < 1e-12 &&
-		    fabs(fabs(c->cut[i].offset) - fabs(p->offset)) < c->near)
+	for (int i = 0; i < s->cuts; i++)
+		if (fabs(fabs(v3_dot(s->cut[i].normal, p->normal)) - 1) < 1e-12 &&
+		    fabs(fabs(s->cut[i].offset) - fabs(p->offset)) < c->near)
 			return;
-	c->cut[c->n++] = *p;
+	s->cut[s->cuts++] = *p;
+}
+
+static void turn_round(struct plane *p)
+{
+	for (int k = 0; k < 3; k++)
+		p->normal[k] = -p->normal[k];
+	p->offset = -p->offset;
+}
+
+/* A plane through an edge of a blocker and a corner of f or g, or the reverse: where it
+ * cuts f, it may end a shadow; where it has the blocker on one side and both facets on the
+ * other, the blocker does nothing. `kink`: the edge has a parallel one. */
+static void consider(struct cuts *c, const struct blocker *b, int number, struct plane *p,
+                     int kink)
+{
+	struct shadows *s = c->s;
+	int of_g = side_of(p, c->g->v, c->g->n, 3, c->near);
+	int of_f = of_g || kink ? side_of(p, c->f->v, c->f->n, 3, c->near) : 1;
+
+	if (of_f && of_f != of_g)
+		return;
+	int of_b = of_g ? blocker_side(b, p, c->near) : 0;
+	if (of_f) {
+		s->idle |= (uint64_t)(of_b == -of_f) << number;
+		return;
+	}
+	if (kink || of_b)
+		add(c, p);
+	if (of_b != -of_g || !of_b || s->limits == SHADOW_LIMITS)
+		return;
+	if (of_b < 0)
+		turn_round(p);
+	s->blocker[s->limits] = number;
+	s->limit[s->limits++] = *p;
 }
 
 /* The plane through an edge and a point; 0 if they are in line. */
@@ -59,15 +101,6 @@ static int plane_through(const double a[3], const double b[3], const double x[3]
 	return 1;
 }
 
-/* Corners of a blocker: where its edges begin, and end. */
-static int blocker_one_side(const struct blocker *b, const struct plane *p, double near)
-{
-	const int stride = (int)(sizeof b->edge[0] / sizeof(double));
-
-	return one_side(p, b->edge[0].a, b->edges, stride, near) &&
-	       one_side(p, b->edge[0].b, b->edges, stride, near);
-}
-
 static int parallel(const double a[3], const double b[3], const double c[3], const double d[3])
 {
 	double u[3], v[3], s[3];
@@ -78,32 +111,70 @@ static int parallel(const double a[3], const double b[3], const double c[3], con
 	return v3_dot(s, s) <= 1e-12 * v3_dot(u, u) * v3_dot(v, v);
 }
 
-static void blocker_cuts(struct cuts *c, const struct blocker *b, const struct facet *g)
+/* Does a face of the blocker have both facets in front of it, or an edge's plane through a
+ * corner of f the blocker on one side and them on the other? */
+static void find_idle(struct cuts *c, const struct blocker *b, int number)
 {
 	struct plane p;
 
+	for (int i = 0; i < b->faces; i++) {
+		int of_f = side_of(&b->face[i], c->f->v, c->f->n, 3, c->near);
+		if (of_f && (b->flat || of_f > 0) &&
+		    side_of(&b->face[i], c->g->v, c->g->n, 3, c->near) == of_f)
+			c->s->idle |= (uint64_t)1 << number;
+	}
+	for (int i = 0; i < b->edges && !(c->s->idle >> number & 1); i++)
+		for (int j = 0; j < c->f->n; j++)
+			if (plane_through(b->edge[i].a, b->edge[i].b, &c->f->v[3 * j], c->near, &p) &&
+			    side_of(&p, c->f->v, c->f->n, 3, c->near))
+				consider(c, b, number, &p, 0);
+}
+
+static void blocker_cuts(struct cuts *c, const struct blocker *b, int number)
+{
+	const struct facet *g = c->g;
+	struct plane p;
+
 	for (int i = 0; i < b->edges; i++)
-		for (int j = 0; j < g->n; j++) {
+		for (int j = 0; j < g->n && !(c->s->idle >> number & 1); j++) {
 			const double *from = b->edge[i].a, *to = b->edge[i].b, *v = &g->v[3 * j];
 			const double *next = &g->v[3 * ((j + 1) % g->n)];
-			if (plane_through(from, to, v, c->near, &p) &&
-			    (parallel(from, to, v, next) ||
-			     (one_side(&p, g->v, g->n, 3, c->near) && blocker_one_side(b, &p, c->near))))
-				add(c, &p);
-			if (plane_through(v, next, from, c->near, &p) &&
-			    one_side(&p, g->v, g->n, 3, c->near) && blocker_one_side(b, &p, c->near))
-				add(c, &p);
+			if (plane_through(from, to, v, c->near, &p))
+				consider(c, b, number, &p, parallel(from, to, v, next));
+			if (plane_through(v, next, from, c->near, &p))
+				consider(c, b, number, &p, 0);
 		}
 }
 
-int shadow_cuts(const struct blocker *b, int blockers, const struct facet *f,
-                const struct facet *g, double near, struct plane cut[SHADOW_CUTS])
+/* Planes through parallel edges of two blockers with one on each side: the gap between them
+ * opens there. */
+static void gap_cuts(struct cuts *c, const struct blocker *a, const struct blocker *b)
 {
-	struct cuts c = { f, near, cut, 0 };
+	struct plane p;
 
-	for (int i = 0; i < blockers; i++)
-		blocker_cuts(&c, &b[i], g);
-	return c.n;
+	for (int i = 0; i < a->edges; i++)
+		for (int j = 0; j < b->edges; j++)
+			if (parallel(a->edge[i].a, a->edge[i].b, b->edge[j].a, b->edge[j].b) &&
+			    plane_through(a->edge[i].a, a->edge[i].b, b->edge[j].a, c->near, &p) &&
+			    !side_of(&p, c->f->v, c->f->n, 3, c->near) &&
+			    blocker_side(a, &p, c->near) * blocker_side(b, &p, c->near) < 0)
+				add(c, &p);
+}
+
+void shadow_edges(const struct blocker *b, int blockers, const struct facet *f,
+                  const struct facet *g, double near, struct shadows *s)
+{
+	struct cuts c = { f, g, near, s };
+
+	s->cuts = s->limits = 0;
+	s->idle = 0;
+	for (int i = 0; i < blockers; i++) {
+		find_idle(&c, &b[i], i);
+		blocker_cuts(&c, &b[i], i);
+	}
+	for (int i = 0; i < blockers && s->cuts < SHADOW_CUTS; i++)
+		for (int j = 0; j < i; j++)
+			gap_cuts(&c, &b[i], &b[j]);
 }
 
 /* ---- cells ---- */
@@ -139,18 +210,19 @@ static int cuts_flat(const struct blocker *b, const double p[3], const double q[
 		v3_sub(b->centre, b->edge[i].a, w);
 		v3_cross(u, v, c);
 		v3_cross(u, w, d);
-		if (v3_dot(c, d) < 0)
+		if (v3_dot(c, d) < -near * v3_length(u) * v3_length(d))
 			return 0;
 	}
 	return 1;
 }
 
-static int cuts_solid(const struct blocker *b, const double p[3], const double q[3])
+static int cuts_solid(const struct blocker *b, const double p[3], const double q[3], double near)
 {
 	double from = 0, to = 1;
 
 	for (int i = 0; i < b->faces; i++) {
-		double hp = plane_height(&b->face[i], p), hq = plane_height(&b->face[i], q);
+		double hp = plane_height(&b->face[i], p) - near;
+		double hq = plane_height(&b->face[i], q) - near;
 		if (hp > 0 && hq > 0)
 			return 0;
 		if (hp > 0)
@@ -167,20 +239,65 @@ int blocker_hides(const struct blocker *b, const struct facet *f, const struct f
 	for (int i = 0; i < f->n; i++)
 		for (int j = 0; j < g->n; j++)
 			if (!(b->flat ? cuts_flat(b, &f->v[3 * i], &g->v[3 * j], near)
-			              : cuts_solid(b, &f->v[3 * i], &g->v[3 * j])))
+			              : cuts_solid(b, &f->v[3 * i], &g->v[3 * j], near)))
 				return 0;
 	return 1;
 }
 
-uint64_t shadow_on(const struct blocker *b, uint64_t from, const struct facet *cell,
-                   const struct facet *g, double near, int *hidden)
+/* Halves a facet across its longest edge. */
+static int halve(const struct facet *f, struct facet_room half[2])
+{
+	double u[3], back[3], longest = 0, normal[3] = { 0 };
+
+	for (int i = 0; i < f->n; i++) {
+		v3_sub(&f->v[3 * ((i + 1) % f->n)], &f->v[3 * i], u);
+		double l = v3_normalise(u);
+		if (l > longest) {
+			longest = l;
+			for (int k = 0; k < 3; k++) {
+				normal[k] = u[k];
+				back[k] = -u[k];
+			}
+		}
+	}
+	double middle = v3_dot(normal, f->centre);
+	return longest > 0 && f->n < FACET_CORNERS - 1 && facet_clip(f, normal, middle, &half[0]) &&
+	       facet_clip(f, back, -middle, &half[1]);
+}
+
+int blockers_hide(const struct blocker *b, uint64_t from, const struct facet *f,
+                  const struct facet *g, double near, int depth)
+{
+	struct facet_room half[2];
+	struct facet eye = { .n = 1, .v = f->centre }, aim = { .n = 1, .v = g->centre };
+	int crossed = 0;
+
+	for (uint64_t i = from; i; i &= i - 1) {
+		const struct blocker *k = &b[__builtin_ctzll(i)];
+		if (!blocker_hides(k, &eye, &aim, near))
+			continue;
+		crossed = 1;
+		if (blocker_hides(k, f, g, near))
+			return 1;
+	}
+	return crossed && depth > 0 && halve(g, half) &&
+	       blockers_hide(b, from, f, &half[0].f, near, depth - 1) &&
+	       blockers_hide(b, from, f, &half[1].f, near, depth - 1);
+}
+
+uint64_t shadow_on(const struct blocker *b, const struct shadows *s, uint64_t from,
+                   const struct facet *cell, const struct facet *g, double near, int *hidden)
 {
 	struct plane shaft[SHAFT_PLANES];
-	int planes = shaft_planes(cell, g, near, shaft);
 	uint64_t left = from;
 
 	*hidden = 0;
-	for (uint64_t i = from; i; i &= i - 1) {
+	for (int i = 0; i < s->limits; i++)
+		if (left >> s->blocker[i] & 1 &&
+		    side_of(&s->limit[i], cell->v, cell->n, 3, near) < 0)
+			left &= ~((uint64_t)1 << s->blocker[i]);
+	int planes = left ? shaft_planes(cell, g, near, shaft) : 0;
+	for (uint64_t i = left; i; i &= i - 1) {
 		int k = __builtin_ctzll(i);
 		if (outside(&b[k], shaft, planes, near))
 			left &= ~((uint64_t)1 << k);
