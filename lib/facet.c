@@ -76,3 +76,48 @@ int facet_clip(const struct facet *f, const double normal[3], double offset,
 	out->f = g;
 	return g.area > 0;
 }
+
+int facet_split(const struct facet *f, const double normal[3], double offset,
+                struct facet_room part[2])
+{
+	double back[3] = { -normal[0], -normal[1], -normal[2] };
+
+	return f->n < FACET_CORNERS && facet_clip(f, normal, offset, &part[0]) &&
+	       facet_clip(f, back, -offset, &part[1]);
+}
+
+/* Unit vector along the longest edge. */
+static void longest_edge(const struct facet *f, double along[3])
+{
+	double longest = 0, u[3];
+
+	for (int i = 0; i < f->n; i++) {
+		v3_sub(&f->v[3 * ((i + 1) % f->n)], &f->v[3 * i], u);
+		double l = v3_normalise(u);
+		if (l > longest) {
+			longest = l;
+			memcpy(along, u, sizeof u);
+		}
+	}
+}
+
+int facet_halve(const struct facet *f, struct facet_room half[2])
+{
+	double along[3] = { 0 };
+
+	longest_edge(f, along);
+	return facet_split(f, along, v3_dot(along, f->centre), half);
+}
+
+int facet_quarter(const struct facet *f, struct facet_room quarter[4])
+{
+	struct facet_room half[2];
+	double along[3] = { 0 }, across[3];
+
+	longest_edge(f, along);
+	v3_cross(f->normal, along, across);
+	double middle = v3_dot(across, f->centre);
+	return facet_split(f, along, v3_dot(along, f->centre), half) &&
+	       facet_split(&half[0].f, across, middle, quarter) &&
+	       facet_split(&half[1].f, across, middle, quarter + 2);
+}

@@ -36,6 +36,15 @@ void facet_heights(const struct facet *f, const double normal[3], double offset,
 int facet_clip(const struct facet *f, const double normal[3], double offset,
                struct facet_room *out);
 
+/* The parts of f in front of and behind a plane. 0 if one has too many corners or no area. */
+int facet_split(const struct facet *f, const double normal[3], double offset,
+                struct facet_room part[2]);
+
+/* Splits f through its centre across its longest edge, into halves, or both across and
+ * along it, into quarters. 0 as above. */
+int facet_halve(const struct facet *f, struct facet_room half[2]);
+int facet_quarter(const struct facet *f, struct facet_room quarter[4]);
+
 /* A point that divides the edge from a to b where heights ha and hb have opposite
  * signs: at height 0. The same bits whichever way round the edge is given. */
 void edge_divide(const double a[3], double ha, const double b[3], double hb, double out[3]);

@@ -9,9 +9,13 @@
 #include "shadow.h"
 #include "vec3.h"
 
+enum { CELL_CORNERS = FACET_CORNERS };
+
 struct cell {
-	double q[4][3];               /* convex, or a triangle with its last corner twice */
+	int n;
+	double v[CELL_CORNERS][3];    /* convex */
 	uint64_t blockers;            /* that may hide something from it */
+	uint32_t cuts;                /* bits of those that may cross it */
 	double most;                  /* its exchange area if nothing were hidden */
 	double value, error;
 };
@@ -31,7 +35,7 @@ struct integral {
 	double near;
 	struct shadows shadows;
 	double settled;               /* of cells that are exact */
-	int cut;                      /* cells end at the edges of shadows */
+	int cut;                      /* cells are to end at the edges of shadows */
 	struct err *e;
 };
 
@@ -44,159 +48,156 @@ void occluded_free(struct occluded *o)
 
 /* ---- cells ---- */
 
+static void set_corners(struct cell *c, const struct facet *f)
+{
+	c->n = f->n;
+	memcpy(c->v, f->v, (size_t)f->n * sizeof c->v[0]);
+}
+
 static struct facet cell_facet(const struct cell *c)
 {
-	struct facet f = { .n = memcmp(c->q[2], c->q[3], sizeof c->q[2]) ? 4 : 3, .v = c->q[0] };
+	struct facet f = { .n = c->n, .v = c->v[0] };
 
+	facet_measure(&f);
 	return f;
 }
 
 /* Settles a cell whose view is clear or hidden: 1. Otherwise narrows its blockers down. */
-static int settle(struct integral *in, const struct facet *f, uint64_t *blockers, double *most)
+static int settle(struct integral *in, struct cell *c, const struct facet *f)
 {
 	int hidden;
 
-	*blockers = shadow_on(in->o->seer.blocker, &in->shadows, *blockers, f, in->g, in->near, &hidden);
+	c->blockers = shadow_on(in->o->seer.blocker, &in->shadows, c->blockers, f, in->g, in->near,
+	                        &hidden);
 	if (hidden)
 		return 1;
-	*most = clear_exchange(in->clear, f, NULL, in->g, NULL);
-	in->settled += *blockers ? 0 : *most;
-	return !*blockers;
+	c->most = clear_exchange(in->clear, f, NULL, in->g, NULL);
+	in->settled += c->blockers ? 0 : c->most;
+	return !c->blockers;
 }
 
-static void measure(const struct integral *in, struct cell *c)
+static void measure(const struct integral *in, struct cell *c, const struct facet *f)
 {
-	double x[4], y[4], z[4], w[4];
-	struct cubature p = { 0, x, y, z, w };
-	struct facet f = { .n = 4, .v = c->q[0] };
+	double x[4][4 * CELL_CORNERS];
+	struct cubature p = { 0, x[0], x[1], x[2], x[3] };
 
-	cubature_fill(&f, 0, &p);
+	cubature_fill(f, 0, &p);
 	c->value = 0;
 	for (int i = 0; i < p.n; i++) {
-		double at[3] = { x[i], y[i], z[i] };
-		if (w[i] > 0)
-			c->value += w[i] * seen(&in->o->seer, at, in->f->normal, in->g, c->blockers, in->e);
+		double at[3] = { p.x[i], p.y[i], p.z[i] };
+		if (p.w[i] > 0)
+			c->value += p.w[i] * seen(&in->o->seer, at, in->f->normal, in->g, c->blockers,
+			                          in->e);
 	}
 }
 
-/* A cell whose points see nothing, or all, though no one blocker hides it and some may: it
- * is settled if together they hide it surely. 1 then. */
-static int settle_dark(const struct integral *in, const struct cell *c, const struct facet *f)
+/* The cut that halves a cell best, of those with a blocker that matters to it; forgets
+ * cuts that do not cross it. -1 if none is left. */
+static int best_cut(const struct integral *in, struct cell *c, const struct facet *f)
+{
+	double best = 0;
+	int at = -1;
+
+	for (int i = 0; i < in->shadows.cuts; i++) {
+		double lowest, highest;
+		if (!(c->cuts >> i & 1))
+			continue;
+		facet_heights(f, in->shadows.cut[i].normal, in->shadows.cut[i].offset, &lowest, &highest);
+		if (lowest >= -in->near || highest <= in->near || !(in->shadows.of[i] & c->blockers)) {
+			c->cuts &= ~((uint32_t)1 << i);
+		} else if (fmin(-lowest, highest) > best * (highest - lowest)) {
+			best = fmin(-lowest, highest) / (highest - lowest);
+			at = i;
+		}
+	}
+	return at;
+}
+
+/* What the least error is that a measured cell can claim: more where edges of shadows are
+ * known to cross it, where a corner sees what its points did not, or where it has not been
+ * compared with its quarters. */
+static double doubt(const struct integral *in, struct cell *c, const struct facet *f, int compared)
+{
+	int dark = c->value == 0, bright = c->value >= (1 - 1e-9) * c->most;
+	double off = 0;
+
+	if (!in->cut || best_cut(in, c, f) >= 0)
+		return unseen * c->most;
+	if (!(dark || bright))
+		return compared ? 0 : unproved * c->most;
+	for (int k = 0; k < c->n; k++) {
+		double s = seen(&in->o->seer, c->v[k], in->f->normal, in->g, c->blockers, in->e);
+		double all = contour_point(c->v[k], in->f->normal, in->g->n, in->g->v);
+		off = fmax(off, dark ? s / all : 1 - s / all);
+	}
+	return c->most * (unlikely + unproved * off);
+}
+
+/* The parts that a cell is refined into: on both sides of the edge of a shadow, or
+ * quarters. Returns their number. */
+static int divide(const struct integral *in, struct cell *c, struct facet_room part[4])
+{
+	struct facet f = cell_facet(c);
+	int i = in->cut ? best_cut(in, c, &f) : -1;
+
+	if (i < 0)
+		return facet_quarter(&f, part) ? 4 : 0;
+	c->cuts &= ~((uint32_t)1 << i);
+	return facet_split(&f, in->shadows.cut[i].normal, in->shadows.cut[i].offset, part) ? 2 : 0;
+}
+
+/* Is it sure that the blockers together hide all from a cell that saw nothing? */
+static int dark(const struct integral *in, const struct cell *c, const struct facet *f)
 {
 	return c->value == 0 &&
 	       blockers_hide(in->o->seer.blocker, c->blockers, f, in->g, in->near, HALVINGS);
 }
 
-/* The least error that a measured cell can claim: more where a corner sees what the points
- * did not. */
-static double doubt(const struct integral *in, const struct cell *c)
-{
-	int dark = c->value == 0, bright = c->value >= (1 - 1e-9) * c->most;
-	double off = 0;
-
-	if (!in->cut || !(dark || bright))
-		return in->cut ? 0 : unseen * c->most;
-	for (int k = 0; k < 4; k++) {
-		double f = seen(&in->o->seer, c->q[k], in->f->normal, in->g, c->blockers, in->e);
-		double all = contour_point(c->q[k], in->f->normal, in->g->n, in->g->v);
-		off = fmax(off, dark ? f / all : 1 - f / all);
-	}
-	return c->most * (unlikely + unproved * off);
-}
-
-static void middle(const double a[3], const double b[3], double out[3])
-{
-	for (int k = 0; k < 3; k++)
-		out[k] = (a[k] + b[k]) / 2;
-}
-
-static void quarters(const struct cell *c, struct cell quarter[4])
-{
-	double mid[4][3], centre[3];
-
-	for (int k = 0; k < 4; k++)
-		middle(c->q[k], c->q[(k + 1) % 4], mid[k]);
-	middle(mid[0], mid[2], centre);
-	for (int k = 0; k < 4; k++) {
-		memcpy(quarter[k].q[0], c->q[k], sizeof c->q[k]);
-		memcpy(quarter[k].q[1], mid[k], sizeof c->q[k]);
-		memcpy(quarter[k].q[2], centre, sizeof c->q[k]);
-		memcpy(quarter[k].q[3], mid[(k + 3) % 4], sizeof c->q[k]);
-		quarter[k].blockers = c->blockers;
-	}
-}
-
-/* Replaces a cell by its four quarters. */
+/* Replaces a cell by its parts. */
 static int refine(struct integral *in, size_t i)
 {
 	struct vec *cells = &in->o->cell;
-	struct cell c = ((struct cell *)cells->data)[i], quarter[4];
+	struct cell c = ((struct cell *)cells->data)[i], part[4];
+	struct facet_room room[4];
 	double before = in->settled, sum = 0;
-	int left = 0;
+	int n = divide(in, &c, room), left = 0;
 
-	quarters(&c, quarter);
+	if (!n) { /* too small to divide */
+		((struct cell *)cells->data)[i].error = 0;
+		return 0;
+	}
 	((struct cell *)cells->data)[i] = ((struct cell *)cells->data)[--cells->n];
-	for (int k = 0; k < 4; k++) {
-		struct facet f = cell_facet(&quarter[k]);
-		facet_measure(&f);
-		if (f.area == 0 || settle(in, &f, &quarter[k].blockers, &quarter[k].most))
+	for (int k = 0; k < n; k++) {
+		const struct facet *f = &room[k].f;
+		part[left] = (struct cell){ .blockers = c.blockers, .cuts = c.cuts };
+		set_corners(&part[left], f);
+		if (settle(in, &part[left], f))
 			continue;
-		measure(in, &quarter[k]);
-		sum += quarter[k].value;
-		if (!settle_dark(in, &quarter[k], &f))
-			quarter[left++] = quarter[k];
+		measure(in, &part[left], f);
+		sum += part[left].value;
+		left += !dark(in, &part[left], f);
 	}
 	/* A rule of fourth order leaves a fifteenth of the difference where what is seen is
 	 * smooth, a third across the edge of a shadow. */
 	double off = fabs(sum + in->settled - before - c.value) / (3 * left);
-	for (int k = 0; k < left; k++)
-		quarter[k].error = fmax(off, doubt(in, &quarter[k]));
-	return vec_append(cells, quarter, (size_t)left, sizeof *quarter, in->e);
+	for (int k = 0; k < left; k++) {
+		struct facet f = cell_facet(&part[k]);
+		part[k].error = fmax(off, doubt(in, &part[k], &f, n == 4));
+	}
+	return vec_append(cells, part, (size_t)left, sizeof *part, in->e);
 }
 
-static int put_cells(struct integral *in, const struct facet *f, uint64_t blockers)
+static int put_whole(struct integral *in, uint64_t blockers)
 {
-	double most;
+	struct cell c = { .blockers = blockers,
+	                  .cuts = (uint32_t)(((uint64_t)1 << in->shadows.cuts) - 1) };
 
-	if (settle(in, f, &blockers, &most))
+	set_corners(&c, in->f);
+	if (settle(in, &c, in->f))
 		return 0;
-	for (int i = 0; 2 * i + 3 <= f->n; i++) {
-		struct cell c = { .blockers = blockers, .most = most };
-		for (int k = 0; k < 4; k++) {
-			int corner = k == 0 ? 0 : 2 * i + k < f->n ? 2 * i + k : f->n - 1;
-			memcpy(c.q[k], &f->v[3 * corner], sizeof c.q[k]);
-		}
-		struct facet part = cell_facet(&c);
-		facet_measure(&part);
-		c.most *= part.area / f->area;
-		c.error = unproved * c.most;
-		measure(in, &c);
-		if (!settle_dark(in, &c, &part) && vec_append(&in->o->cell, &c, 1, sizeof c, in->e))
-			return -1;
-	}
-	return 0;
-}
-
-/* Cells between the cuts, each convex. */
-static int cut_cells(struct integral *in, const struct facet *f, uint64_t blockers,
-                     const struct plane *cuts, int n)
-{
-	struct facet_room low, high;
-
-	for (; n > 0; n--) {
-		double lowest, highest, back[3];
-		const struct plane *p = &cuts[n - 1];
-		facet_heights(f, p->normal, p->offset, &lowest, &highest);
-		if (lowest >= -in->near || highest <= in->near || f->n + 1 >= FACET_CORNERS)
-			continue;
-		for (int k = 0; k < 3; k++)
-			back[k] = -p->normal[k];
-		return (facet_clip(f, p->normal, p->offset, &high) &&
-		        cut_cells(in, &high.f, blockers, cuts, n - 1)) ||
-		       (facet_clip(f, back, -p->offset, &low) &&
-		        cut_cells(in, &low.f, blockers, cuts, n - 1));
-	}
-	return put_cells(in, f, blockers);
+	measure(in, &c, in->f);
+	c.error = unproved * c.most;
+	return vec_append(&in->o->cell, &c, 1, sizeof c, in->e);
 }
 
 /* ---- the integral ---- */
@@ -262,7 +263,7 @@ double occluded_exchange(struct occluded *o, struct clear *clear, const struct s
 	in.cut = tolerance < 2 * unseen * clear_exchange(clear, in.f, NULL, in.g, NULL);
 	if (in.cut)
 		shadow_edges(o->seer.blocker, o->blockers, in.f, in.g, in.near, &in.shadows);
-	if (cut_cells(&in, in.f, all & ~in.shadows.idle, in.shadows.cut, in.shadows.cuts))
+	if (put_whole(&in, all & ~in.shadows.idle))
 		return NAN;
 	return integrate(&in, tolerance, most, error);
 }

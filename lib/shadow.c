@@ -36,16 +36,19 @@ static int blocker_side(const struct blocker *b, const struct plane *p, double n
 	return begins == ends ? begins : 0;
 }
 
-static void add(struct cuts *c, const struct plane *p)
+static void add(struct cuts *c, const struct plane *p, uint64_t of)
 {
 	struct shadows *s = c->s;
 
-	if (s->cuts == SHADOW_CUTS)
-		return;
 	for (int i = 0; i < s->cuts; i++)
 		if (fabs(fabs(v3_dot(s->cut[i].normal, p->normal)) - 1) < 1e-12 &&
-		    fabs(fabs(s->cut[i].offset) - fabs(p->offset)) < c->near)
+		    fabs(fabs(s->cut[i].offset) - fabs(p->offset)) < c->near) {
+			s->of[i] |= of;
 			return;
+		}
+	if (s->cuts == SHADOW_CUTS)
+		return;
+	s->of[s->cuts] = of;
 	s->cut[s->cuts++] = *p;
 }
 
@@ -74,7 +77,7 @@ static void consider(struct cuts *c, const struct blocker *b, int number, struct
 		return;
 	}
 	if (kink || of_b)
-		add(c, p);
+		add(c, p, (uint64_t)1 << number);
 	if (of_b != -of_g || !of_b || s->limits == SHADOW_LIMITS)
 		return;
 	if (of_b < 0)
@@ -119,9 +122,11 @@ static void find_idle(struct cuts *c, const struct blocker *b, int number)
 
 	for (int i = 0; i < b->faces; i++) {
 		int of_f = side_of(&b->face[i], c->f->v, c->f->n, 3, c->near);
-		if (of_f && (b->flat || of_f > 0) &&
-		    side_of(&b->face[i], c->g->v, c->g->n, 3, c->near) == of_f)
+		int of_g = side_of(&b->face[i], c->g->v, c->g->n, 3, c->near);
+		if (of_f && of_g == of_f && (b->flat || of_f > 0))
 			c->s->idle |= (uint64_t)1 << number;
+		else if (!of_f && !of_g && !b->flat)
+			add(c, &b->face[i], (uint64_t)1 << number);
 	}
 	for (int i = 0; i < b->edges && !(c->s->idle >> number & 1); i++)
 		for (int j = 0; j < c->f->n; j++)
@@ -148,7 +153,7 @@ static void blocker_cuts(struct cuts *c, const struct blocker *b, int number)
 
 /* Planes through parallel edges of two blockers with one on each side: the gap between them
  * opens there. */
-static void gap_cuts(struct cuts *c, const struct blocker *a, const struct blocker *b)
+static void gap_cuts(struct cuts *c, const struct blocker *a, const struct blocker *b, uint64_t of)
 {
 	struct plane p;
 
@@ -158,7 +163,7 @@ static void gap_cuts(struct cuts *c, const struct blocker *a, const struct block
 			    plane_through(a->edge[i].a, a->edge[i].b, b->edge[j].a, c->near, &p) &&
 			    !side_of(&p, c->f->v, c->f->n, 3, c->near) &&
 			    blocker_side(a, &p, c->near) * blocker_side(b, &p, c->near) < 0)
-				add(c, &p);
+				add(c, &p, of);
 }
 
 void shadow_edges(const struct blocker *b, int blockers, const struct facet *f,
@@ -174,7 +179,7 @@ void shadow_edges(const struct blocker *b, int blockers, const struct facet *f,
 	}
 	for (int i = 0; i < blockers && s->cuts < SHADOW_CUTS; i++)
 		for (int j = 0; j < i; j++)
-			gap_cuts(&c, &b[i], &b[j]);
+			gap_cuts(&c, &b[i], &b[j], (uint64_t)1 << i | (uint64_t)1 << j);
 }
 
 /* ---- cells ---- */
@@ -244,27 +249,6 @@ int blocker_hides(const struct blocker *b, const struct facet *f, const struct f
 	return 1;
 }
 
-/* Halves a facet across its longest edge. */
-static int halve(const struct facet *f, struct facet_room half[2])
-{
-	double u[3], back[3], longest = 0, normal[3] = { 0 };
-
-	for (int i = 0; i < f->n; i++) {
-		v3_sub(&f->v[3 * ((i + 1) % f->n)], &f->v[3 * i], u);
-		double l = v3_normalise(u);
-		if (l > longest) {
-			longest = l;
-			for (int k = 0; k < 3; k++) {
-				normal[k] = u[k];
-				back[k] = -u[k];
-			}
-		}
-	}
-	double middle = v3_dot(normal, f->centre);
-	return longest > 0 && f->n < FACET_CORNERS - 1 && facet_clip(f, normal, middle, &half[0]) &&
-	       facet_clip(f, back, -middle, &half[1]);
-}
-
 int blockers_hide(const struct blocker *b, uint64_t from, const struct facet *f,
                   const struct facet *g, double near, int depth)
 {
@@ -280,7 +264,7 @@ int blockers_hide(const struct blocker *b, uint64_t from, const struct facet *f,
 		if (blocker_hides(k, f, g, near))
 			return 1;
 	}
-	return crossed && depth > 0 && halve(g, half) &&
+	return crossed && depth > 0 && facet_halve(g, half) &&
 	       blockers_hide(b, from, f, &half[0].f, near, depth - 1) &&
 	       blockers_hide(b, from, f, &half[1].f, near, depth - 1);
 }

@@ -8,6 +8,7 @@ enum { SHADOW_CUTS = 32, SHADOW_LIMITS = 96 };
 
 struct shadows {
 	struct plane cut[SHADOW_CUTS];
+	uint64_t of[SHADOW_CUTS];     /* bits of the blockers that each is an edge of */
 	int cuts;
 	/* Planes with a blocker in front of them and all of g behind: what of f is behind
 	 * one sees g past that blocker. */
@@ -18,8 +19,8 @@ struct shadows {
 
 /* Planes that cut facet f where what its points see of facet g past the blockers changes
  * its law: through an edge of one and a corner of the other that have all of each on one
- * side (edges of the whole shadow and of its core), or through parallel edges of both or
- * of two blockers, where a gap between them opens. No more are kept than fit.
+ * side (edges of the whole shadow and of its core), through parallel edges of both or of
+ * two blockers, where a gap between them opens, or through a blocker's face that g crosses. No more are kept than fit.
  * O((blockers x edges)^2). */
 void shadow_edges(const struct blocker *b, int blockers, const struct facet *f,
                   const struct facet *g, double near, struct shadows *s);
