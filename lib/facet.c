@@ -19,7 +19,7 @@ void facet_measure(struct facet *f)
 		v3_sub(&f->v[3 * ((i + 1) % f->n)], f->centre, b);
 		v3_cross(a, b, c);
 		v3_mad(twice, 1, c, twice);
-		far = fmax(far, v3_dot(a, a));
+		far = v3_dot(a, a) > far ? v3_dot(a, a) : far;
 	}
 	f->area = v3_length(twice) / 2;
 	f->radius = sqrt(far);
@@ -37,15 +37,15 @@ void facet_heights(const struct facet *f, const double normal[3], double offset,
 	*highest = -INFINITY;
 	for (int i = 0; i < f->n; i++) {
 		double h = v3_dot(normal, &f->v[3 * i]) - offset;
-		*lowest = fmin(*lowest, h);
-		*highest = fmax(*highest, h);
+		*lowest = h < *lowest ? h : *lowest;
+		*highest = h > *highest ? h : *highest;
 	}
 }
 
 void edge_divide(const double a[3], double ha, const double b[3], double hb, double out[3])
 {
 	const double *low = ha < hb ? a : b, *high = ha < hb ? b : a;
-	double w = fmin(ha, hb) / (fmin(ha, hb) - fmax(ha, hb));
+	double w = ha < hb ? ha / (ha - hb) : hb / (hb - ha);
 
 	for (int k = 0; k < 3; k++)
 		out[k] = low[k] + w * (high[k] - low[k]);

@@ -24,32 +24,47 @@ void seer_free(struct seer *s)
 	*s = (struct seer){ 0 };
 }
 
+/* Copies of pieces copy no more than there is. */
+static void copy_piece(struct facet_piece *to, const struct facet_piece *from)
+{
+	to->n = from->n;
+	memcpy(to->v, from->v, (size_t)from->n * sizeof from->v[0]);
+}
+
+/* Heights of a piece's corners over a plane through x; what rounding makes of 0 is 0.
+ * Returns bit 0: some are above, bit 1: some below. */
+static int heights(const struct facet_piece *p, const double x[3], const double normal[3],
+                   double *h)
+{
+	double reach = 0, offset = v3_dot(normal, x);
+	int sides = 0;
+
+	for (int i = 0; i < p->n; i++) {
+		h[i] = v3_dot(normal, p->v[i]) - offset;
+		double size = fabs(h[i]);
+		reach = size > reach ? size : reach;
+	}
+	for (int i = 0; i < p->n; i++) {
+		h[i] = fabs(h[i]) <= 1e-12 * reach ? 0 : h[i];
+		sides |= h[i] > 0 ? 1 : h[i] < 0 ? 2 : 0;
+	}
+	return sides;
+}
+
 /* Cuts a convex piece by a plane through x: what is on the positive side stays in p, the
  * rest goes to `away`. Each gets n = 0 where nothing is left. */
 static void cut_piece(struct facet_piece *p, const double x[3], const double normal[3],
                       struct facet_piece *away)
 {
-	double h[PIECE_CORNERS], reach = 0;
+	double h[PIECE_CORNERS];
 	struct facet_piece in;
-	int above = 0, below = 0;
+	int sides = heights(p, x, normal, h);
 
 	away->n = in.n = 0;
-	for (int i = 0; i < p->n; i++) {
-		double d[3];
-		v3_sub(p->v[i], x, d);
-		h[i] = v3_dot(normal, d);
-		reach = fmax(reach, fabs(h[i]));
-	}
-	for (int i = 0; i < p->n; i++) {
-		h[i] = fabs(h[i]) <= 1e-13 * reach ? 0 : h[i];
-		above += h[i] > 0;
-		below += h[i] < 0;
-	}
-	if (!below)
+	if (!(sides & 2))
 		return;
-	if (!above) {
-		away->n = p->n;
-		memcpy(away->v, p->v, (size_t)p->n * sizeof p->v[0]);
+	if (!(sides & 1)) {
+		copy_piece(away, p);
 		p->n = 0;
 		return;
 	}
@@ -65,8 +80,7 @@ static void cut_piece(struct facet_piece *p, const double x[3], const double nor
 			in.n++;
 		}
 	}
-	p->n = in.n;
-	memcpy(p->v, in.v, (size_t)in.n * sizeof in.v[0]);
+	copy_piece(p, &in);
 }
 
 /* Planes through x and the silhouette of a blocker, with its inside positive. -1 if x is
@@ -102,13 +116,19 @@ static int silhouette(const struct blocker *b, const double x[3], double near,
 	return n;
 }
 
+/* Room for one more piece behind those of a list; NULL and e when memory is short. */
+static struct facet_piece *more(struct vec *list, struct err *e)
+{
+	if (vec_reserve(list, 1, sizeof(struct facet_piece), e))
+		return NULL;
+	return (struct facet_piece *)list->data + list->n;
+}
+
 /* Takes from the visible pieces what a blocker hides from x. */
-static int hide(struct seer *o, const struct blocker *b, const double x[3],
-                struct err *e)
+static int hide(struct seer *o, const struct blocker *b, const double x[3], struct err *e)
 {
 	double plane[BLOCKER_EDGES][3];
 	int n = silhouette(b, x, o->near, plane);
-	struct facet_piece away;
 
 	if (n < 0)
 		o->piece.n = 0;
@@ -120,9 +140,11 @@ static int hide(struct seer *o, const struct blocker *b, const double x[3],
 		if (p->n + n > PIECE_CORNERS)
 			return err_set(e, "a blocker's silhouette has too many edges");
 		for (int k = 0; k < n && p->n; k++) {
-			cut_piece(p, x, plane[k], &away);
-			if (away.n >= 3 && vec_append(&o->next, &away, 1, sizeof away, e))
+			struct facet_piece *away = more(&o->next, e);
+			if (!away)
 				return -1;
+			cut_piece(p, x, plane[k], away);
+			o->next.n += away->n >= 3;
 		}
 	}
 	struct vec swap = o->piece;
@@ -134,14 +156,16 @@ static int hide(struct seer *o, const struct blocker *b, const double x[3],
 double seen(struct seer *o, const double x[3], const double normal[3], const struct facet *g,
             uint64_t blockers, struct err *e)
 {
-	struct facet_piece whole = { .n = g->n };
+	struct facet_piece *whole;
 	double sum = 0;
 
 	o->evaluations++;
-	memcpy(whole.v, g->v, (size_t)g->n * sizeof whole.v[0]);
 	o->piece.n = 0;
-	if (vec_append(&o->piece, &whole, 1, sizeof whole, e))
+	if (!(whole = more(&o->piece, e)))
 		return NAN;
+	whole->n = g->n;
+	memcpy(whole->v, g->v, (size_t)g->n * sizeof whole->v[0]);
+	o->piece.n = 1;
 	for (uint64_t left = blockers; left && o->piece.n; left &= left - 1)
 		if (hide(o, &o->blocker[__builtin_ctzll(left)], x, e))
 			return NAN;

@@ -280,7 +280,8 @@ uint64_t shadow_on(const struct blocker *b, const struct shadows *s, uint64_t fr
 		if (left >> s->blocker[i] & 1 &&
 		    side_of(&s->limit[i], cell->v, cell->n, 3, near) < 0)
 			left &= ~((uint64_t)1 << s->blocker[i]);
-	int planes = left ? shaft_planes(cell, g, near, shaft) : 0;
+	/* Where the limits of shadows are known they say as much. */
+	int planes = left && !s->limits ? shaft_planes(cell, g, near, shaft) : 0;
 	for (uint64_t i = left; i; i &= i - 1) {
 		int k = __builtin_ctzll(i);
 		if (outside(&b[k], shaft, planes, near))
