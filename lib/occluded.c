@@ -16,8 +16,9 @@ struct cell {
 	double v[CELL_CORNERS][3];    /* convex */
 	uint64_t blockers;            /* that may hide something from it */
 	uint32_t cuts;                /* bits of those that may cross it */
-	double most;                  /* its exchange area if nothing were hidden */
+	double most;                  /* about its exchange area if nothing were hidden */
 	double value, error;
+	int bright;                   /* no blocker hid anything from its points */
 };
 
 /* What may be wrong with a cell, as a fraction of `most`: before it is compared with its
@@ -71,8 +72,8 @@ static int settle(struct integral *in, struct cell *c, const struct facet *f)
 	                        &hidden);
 	if (hidden)
 		return 1;
-	c->most = clear_exchange(in->clear, f, NULL, in->g, NULL);
-	in->settled += c->blockers ? 0 : c->most;
+	if (!c->blockers)
+		in->settled += clear_exchange(in->clear, f, NULL, in->g, NULL);
 	return !c->blockers;
 }
 
@@ -83,12 +84,14 @@ static void measure(const struct integral *in, struct cell *c, const struct face
 
 	cubature_fill(f, 0, &p);
 	c->value = 0;
+	in->o->seer.hid = 0;
 	for (int i = 0; i < p.n; i++) {
 		double at[3] = { p.x[i], p.y[i], p.z[i] };
 		if (p.w[i] > 0)
 			c->value += p.w[i] * seen(&in->o->seer, at, in->f->normal, in->g, c->blockers,
 			                          in->e);
 	}
+	c->bright = !in->o->seer.hid;
 }
 
 /* The cut that halves a cell best, of those with a blocker that matters to it; forgets
@@ -118,12 +121,12 @@ static int best_cut(const struct integral *in, struct cell *c, const struct face
  * compared with its quarters. */
 static double doubt(const struct integral *in, struct cell *c, const struct facet *f, int compared)
 {
-	int dark = c->value == 0, bright = c->value >= (1 - 1e-9) * c->most;
+	int dark = c->value == 0;
 	double off = 0;
 
 	if (!in->cut || best_cut(in, c, f) >= 0)
 		return unseen * c->most;
-	if (!(dark || bright))
+	if (!(dark || c->bright))
 		return compared ? 0 : unproved * c->most;
 	for (int k = 0; k < c->n; k++) {
 		double s = seen(&in->o->seer, c->v[k], in->f->normal, in->g, c->blockers, in->e);
@@ -159,7 +162,7 @@ static int refine(struct integral *in, size_t i)
 	struct vec *cells = &in->o->cell;
 	struct cell c = ((struct cell *)cells->data)[i], part[4];
 	struct facet_room room[4];
-	double before = in->settled, sum = 0;
+	double before = in->settled, area = cell_facet(&c).area, sum = 0;
 	int n = divide(in, &c, room), left = 0;
 
 	if (!n) { /* too small to divide */
@@ -169,7 +172,8 @@ static int refine(struct integral *in, size_t i)
 	((struct cell *)cells->data)[i] = ((struct cell *)cells->data)[--cells->n];
 	for (int k = 0; k < n; k++) {
 		const struct facet *f = &room[k].f;
-		part[left] = (struct cell){ .blockers = c.blockers, .cuts = c.cuts };
+		part[left] = (struct cell){ .blockers = c.blockers, .cuts = c.cuts,
+		                            .most = c.most * f->area / area };
 		set_corners(&part[left], f);
 		if (settle(in, &part[left], f))
 			continue;
@@ -187,9 +191,9 @@ static int refine(struct integral *in, size_t i)
 	return vec_append(cells, part, (size_t)left, sizeof *part, in->e);
 }
 
-static int put_whole(struct integral *in, uint64_t blockers)
+static int put_whole(struct integral *in, uint64_t blockers, double most)
 {
-	struct cell c = { .blockers = blockers,
+	struct cell c = { .blockers = blockers, .most = most,
 	                  .cuts = (uint32_t)(((uint64_t)1 << in->shadows.cuts) - 1) };
 
 	set_corners(&c, in->f);
@@ -260,10 +264,11 @@ double occluded_exchange(struct occluded *o, struct clear *clear, const struct s
 	o->cell.n = 0;
 	uint64_t all = o->blockers ? UINT64_MAX >> (64 - o->blockers) : 0;
 	/* Cutting pays where more is asked for than cells across shadows' edges can tell. */
-	in.cut = tolerance < 2 * unseen * clear_exchange(clear, in.f, NULL, in.g, NULL);
+	double whole = clear_exchange(clear, in.f, NULL, in.g, NULL);
+	in.cut = tolerance < 2 * unseen * whole;
 	if (in.cut)
 		shadow_edges(o->seer.blocker, o->blockers, in.f, in.g, in.near, &in.shadows);
-	if (put_whole(&in, all & ~in.shadows.idle))
+	if (put_whole(&in, all & ~in.shadows.idle, whole))
 		return NAN;
 	return integrate(&in, tolerance, most, error);
 }

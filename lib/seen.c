@@ -130,8 +130,10 @@ static int hide(struct seer *o, const struct blocker *b, const double x[3], stru
 	double plane[BLOCKER_EDGES][3];
 	int n = silhouette(b, x, o->near, plane);
 
-	if (n < 0)
+	if (n < 0) {
 		o->piece.n = 0;
+		o->hid = 1;
+	}
 	if (n <= 0)
 		return 0;
 	o->next.n = 0;
@@ -146,6 +148,7 @@ static int hide(struct seer *o, const struct blocker *b, const double x[3], stru
 			cut_piece(p, x, plane[k], away);
 			o->next.n += away->n >= 3;
 		}
+		o->hid |= p->n >= 3;
 	}
 	struct vec swap = o->piece;
 	o->piece = o->next;

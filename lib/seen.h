@@ -10,6 +10,7 @@ struct seer {
 	struct blocker blocker[SIGHT_BLOCKERS];
 	double near;                  /* of the body set */
 	struct vec piece, next;       /* what is still visible, convex */
+	int hid;                      /* set when a blocker hides something */
 	double evaluations;           /* so far */
 };
 
