@@ -356,7 +356,7 @@ int radiosity_shoot(struct solution *s, const struct transport *t,
 		r->guessed = v.guessed / emitted;
 		r->solve_bytes = v.sender.bytes;
 		r->bound = lanes_total(v.unshot, v.sender.groups) / emitted *
-		           radiosity_tail_bound(t, o->threads);
+		           radiosity_tail_bound(t, o->threads, &r->solve_bytes);
 	}
 	free(v.weight);
 	free(v.priority);

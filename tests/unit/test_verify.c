@@ -58,6 +58,46 @@ static void test_matrix(void **state)
 	model_free(&m);
 }
 
+/* The same factors with patches as receivers make the same matrix. */
+static void test_matrix_of_patches(void **state)
+{
+	const uint32_t column[] = { 1, 2, 2, 0, 2, 2 };
+	const float value[] = { .25f, .25f, .125f, .25f, .125f, .5f };
+	const uint64_t start[] = { 0, 2, 3, 3, 5, 6 };
+	struct model m;
+	struct ff elements, patches;
+	struct patch_matrix a, b;
+	struct verify v;
+	struct err e = { 0 };
+	double row[2][3], black[2], escape[2];
+
+	(void)state;
+	small_model(&m);
+	small_ff(&elements);
+	small_ff(&patches);
+	patches.to_patches = 1;
+	patches.entries = 6;
+	memcpy(patches.column, column, sizeof column);
+	memcpy(patches.value, value, sizeof value);
+	memcpy(patches.block_start, start, sizeof start);
+	struct ff_scene s = scene_of(&m);
+	assert_int_equal(ff_check(&patches, &s, &e), 0);
+	assert_int_equal(verify_ff(&patches, &s, &v, &e), 0);
+	assert_int_equal(patch_matrix_init(&a, &elements, &s, &e), 0);
+	assert_int_equal(patch_matrix_init(&b, &patches, &s, &e), 0);
+	for (size_t i = 0; i < 3; i++) {
+		patch_matrix_row(&a, i, row[0], &black[0], &escape[0]);
+		patch_matrix_row(&b, i, row[1], &black[1], &escape[1]);
+		assert_memory_equal(row[0], row[1], sizeof row[0]);
+		assert_true(black[0] == black[1] && escape[0] == escape[1]);
+	}
+	patch_matrix_free(&a);
+	patch_matrix_free(&b);
+	ff_free(&elements);
+	ff_free(&patches);
+	model_free(&m);
+}
+
 /* Two plates of areas 1 and 2 that see only each other: F_01 = .5, F_10 = .25. */
 static void exchange(double f01, double f10, double error, struct verify *v)
 {
@@ -194,6 +234,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_matrix),
+		cmocka_unit_test(test_matrix_of_patches),
 		cmocka_unit_test(test_spans),
 		cmocka_unit_test(test_reciprocity),
 		cmocka_unit_test(test_ledger),
