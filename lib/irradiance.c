@@ -2,6 +2,7 @@
  *
  * Threads own ranges of receivers, so sums do not depend on their number; each reads
  * only the entries that land in its range. */
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -58,8 +59,8 @@ struct into {
 	lanes_f32 *variance;
 };
 
-static ALWAYS_INLINE void add(const struct feed *x, const struct into *to, size_t at, double v,
-                       int fresh, int mixed)
+static ALWAYS_INLINE void add(const struct feed *x, const struct into *to, size_t at,
+                              double v, int fresh, int mixed)
 {
 	if (fresh)
 		to->fresh[at] += x->fresh * v;
@@ -204,11 +205,12 @@ static enum part part_of(const struct transport *t, uint32_t row, uint32_t chain
 
 /* Variance of an element's irradiance from the sampling of the rows, as if each
  * sample were independent (stratification makes it smaller): a row of n samples
- * that sends flux U, of which f lands here, adds U^2 f / n. */
+ * that sends flux U, of which f lands here, adds U^2 f / n; one without samples, 0. */
 static lanes variance_of(const struct gather *g, uint32_t row, uint64_t b)
 {
 	const struct transport *t = g->t;
-	double one = t->block[t->row_block[row]].sum / t->row_samples[row];
+	uint32_t samples = t->row_samples[row];
+	double one = samples ? t->block[t->row_block[row]].sum / samples : 0;
 	lanes v = { 0 };
 
 	for (int k = 0; k < LANES && g->first_band + k < g->s->bands; k++) {
@@ -231,7 +233,7 @@ static void set_unit(struct gather *g)
 			for (int k = 0; k < LANES; k++)
 				g->unit = fmax(g->unit, v[k]);
 		}
-	if (!(g->unit > 0))
+	if (!(g->unit >= DBL_MIN))
 		g->unit = 1;
 }
 
@@ -272,13 +274,15 @@ static void set_feeds(struct gather *g)
 
 /* ---- irradiance ---- */
 
-static void put_bands(const struct gather *g)
+static void put_bands(void *arg, size_t begin, size_t end, int thread)
 {
+	const struct gather *g = arg;
 	const struct model *m = g->t->m;
 	double *to[H_PARTS] = { g->s->direct, g->s->caustic, g->s->indirect };
 	size_t bands = (size_t)g->s->bands;
 
-	for (size_t es = 0; es < 2 * m->elements; es++) {
+	(void)thread;
+	for (size_t es = begin; es < end; es++) {
 		uint32_t element = (uint32_t)(es >> 1), patch = m->element_patch[element];
 		size_t side = (es & 1) * g->receivers, at = es * bands + (size_t)g->first_band;
 		size_t from = side + (g->to_patches ? patch : element);
@@ -317,16 +321,18 @@ static int gather_bands(struct gather *g, int threads, struct err *e)
 	g->feed = (struct feed *)lanes_new(g->t->blocks * (sizeof *g->feed / sizeof(lanes)), &feed,
 	                                   "flux by chain", e);
 	int bad = !at || !g->variance || !g->feed;
+	for (int p = 0; !bad && p < H_PARTS; p++)
+		g->flux[p] = at + (size_t)p * n;
 	for (g->first_band = 0; !bad && g->first_band < g->s->bands;
 	     g->first_band += LANES) {
-		for (int p = 0; p < H_PARTS; p++)
-			g->flux[p] = at + (size_t)p * n;
-		memset(at, 0, H_PARTS * n * sizeof *at);
-		memset(g->variance, 0, n * sizeof *g->variance);
+		if (g->first_band) {
+			memset(at, 0, H_PARTS * n * sizeof *at);
+			memset(g->variance, 0, n * sizeof *g->variance);
+		}
 		set_unit(g);
 		set_feeds(g);
 		par_for(g->ranges, 1, threads, add_range, g, NULL);
-		put_bands(g);
+		par_for(g->s->element_sides, 4096, threads, put_bands, g, NULL);
 		g->bytes += bytes_of(g);
 	}
 	free(room);

@@ -66,8 +66,9 @@ struct solver {
 	struct sender sender;
 	struct components parts;
 	double *weight;          /* [2P] 1 / flux emitted in the side's component */
-	double *priority;        /* [2P] at the beginning of the round */
-	lanes unshot[GROUPS_MAX];/* in all, at the beginning of the round */
+	double *priority;        /* [2P] unshot flux by weight when the round began */
+	double *links;           /* [2P] unshot flux of a side's links then, all bands */
+	lanes unshot[GROUPS_MAX];/* in all, then */
 	double guessed, residual;
 };
 
@@ -80,28 +81,38 @@ static double total(const double *x, size_t n)
 	return sum;
 }
 
-/* All unshot flux of a patch-side; by band it is added to `sum`. */
-static double unshot_of(const struct solver *v, uint32_t ps, lanes *sum)
+/* Unshot flux of the links of a patch-side. */
+static lanes link_unshot(const struct solver *v, uint32_t ps, size_t group)
 {
 	const struct sender *s = &v->sender;
-	const lanes *link = s->unshot_link, *diffuse = s->unshot_diffuse + ps * s->groups;
 	const uint64_t *first = v->t->target_link + ps;
-	const double *emission = v->s->unshot_emission + ps * (size_t)s->bands;
-	double all = total(emission, (size_t)s->bands);
+	lanes fresh = { 0 }, mixed = { 0 };
 
-	for (int k = 0; k < s->bands; k++)
-		((double *)sum)[k] += emission[k];
-	for (size_t g = 0; g < s->groups; g++) {
-		lanes fresh = diffuse[g], mixed = { 0 };
-		for (uint64_t l = 2 * first[0]; l < 2 * first[1]; l += 2) {
-			fresh += link[l * s->groups + g];
-			mixed += link[(l + 1) * s->groups + g];
-		}
-		fresh += mixed;
-		sum[g] += fresh;
-		all += lanes_total(&fresh, 1);
+	for (uint64_t l = 2 * first[0]; l < 2 * first[1]; l += 2) {
+		fresh += s->unshot_link[l * s->groups + group];
+		mixed += s->unshot_link[(l + 1) * s->groups + group];
 	}
-	return all;
+	return fresh + mixed;
+}
+
+/* Unshot flux of a patch-side but for its links. */
+static double plain_unshot(const struct solver *v, uint32_t ps)
+{
+	const struct sender *s = &v->sender;
+
+	return total(v->s->unshot_emission + ps * (size_t)s->bands, (size_t)s->bands) +
+	       lanes_total(s->unshot_diffuse + ps * s->groups, s->groups);
+}
+
+static double all_unshot(const struct solver *v, uint32_t ps)
+{
+	double links = 0;
+
+	for (size_t g = 0; g < v->sender.groups; g++) {
+		lanes x = link_unshot(v, ps, g);
+		links += lanes_total(&x, 1);
+	}
+	return plain_unshot(v, ps) + links;
 }
 
 /* Sends what a side's unshot flux was by a row, scaled per band if `part` is given. */
@@ -243,8 +254,25 @@ static void check_ledger(struct solver *v)
 	}
 }
 
-/* Sets v->priority and v->unshot. Returns the largest priority; unshot / emitted of
- * the worst component goes to *worst. */
+/* Unshot flux of a side by band is added to v->unshot, that of its links kept. */
+static void survey_side(struct solver *v, uint32_t ps)
+{
+	const struct sender *s = &v->sender;
+	const double *emission = v->s->unshot_emission + ps * (size_t)s->bands;
+
+	for (int k = 0; k < s->bands; k++)
+		((double *)v->unshot)[k] += emission[k];
+	v->links[ps] = s->link_gain[ps] = 0;
+	for (size_t g = 0; g < s->groups; g++) {
+		lanes x = link_unshot(v, ps, g);
+		v->links[ps] += lanes_total(&x, 1);
+		v->unshot[g] += x + s->unshot_diffuse[ps * s->groups + g];
+	}
+	v->priority[ps] = (plain_unshot(v, ps) + v->links[ps]) * v->weight[ps];
+}
+
+/* Sets v->priority, v->links and v->unshot. Returns the largest priority; unshot /
+ * emitted of the worst component goes to *worst. */
 static double survey(struct solver *v, double *worst)
 {
 	struct components *c = &v->parts;
@@ -253,7 +281,7 @@ static double survey(struct solver *v, double *worst)
 	memset(v->unshot, 0, sizeof v->unshot);
 	memset(c->sum, 0, c->n * sizeof *c->sum);
 	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++) {
-		v->priority[ps] = unshot_of(v, ps, v->unshot) * v->weight[ps];
+		survey_side(v, ps);
 		c->sum[c->of[ps]] += v->priority[ps];
 		top = fmax(top, v->priority[ps]);
 	}
@@ -263,15 +291,19 @@ static double survey(struct solver *v, double *worst)
 	return top;
 }
 
-/* Whether a side's turn has come. Until then its unshot flux has only grown since the
- * survey. */
+/* Whether a side's turn has come, by its unshot flux now. Flux has only grown since the
+ * survey, and running sums tell all but the close cases: links are many. */
 static int is_due(const struct solver *v, uint32_t ps)
 {
-	lanes ignored[GROUPS_MAX] = { { 0 } };
-	double least = v->s->round[0], p = v->priority[ps];
+	const double least = v->s->round[0], close = 1e-9;
 
-	if (p < least || !(p > 0))
-		p = unshot_of(v, ps, ignored) * v->weight[ps];
+	if (v->priority[ps] > 0 && v->priority[ps] >= least)
+		return 1;
+	double about = (plain_unshot(v, ps) + v->links[ps] + v->sender.link_gain[ps]) *
+	               v->weight[ps];
+	if (about < least * (1 - close))
+		return 0;
+	double p = all_unshot(v, ps) * v->weight[ps];
 	return p > 0 && p >= least;
 }
 
@@ -321,7 +353,8 @@ static int solver_init(struct solver *v, struct solution *s, const struct transp
 	*v = (struct solver){ .s = s, .t = t };
 	v->weight = mem_new(s->patch_sides, sizeof *v->weight, "priorities", e);
 	v->priority = mem_new(s->patch_sides, sizeof *v->priority, "priorities", e);
-	if (!v->weight || !v->priority || sender_init(&v->sender, t, e) || sender_load(&v->sender, s, e) ||
+	v->links = mem_new(s->patch_sides, sizeof *v->links, "priorities", e);
+	if (!v->weight || !v->priority || !v->links || sender_init(&v->sender, t, e) || sender_load(&v->sender, s, e) ||
 	    components_init(&v->parts, t, e))
 		return -1;
 	for (uint32_t ps = 0; ps < s->patch_sides; ps++)
@@ -360,6 +393,7 @@ int radiosity_shoot(struct solution *s, const struct transport *t,
 	}
 	free(v.weight);
 	free(v.priority);
+	free(v.links);
 	sender_free(&v.sender);
 	components_free(&v.parts);
 	return bad ? -1 : 0;

@@ -51,6 +51,7 @@ void sender_free(struct sender *s)
 {
 	for (size_t i = 0; i < sizeof s->room / sizeof *s->room; i++)
 		free(s->room[i]);
+	free(s->link_gain);
 	free(s->surface);
 	free(s->chain_flux);
 	free(s->touched);
@@ -64,7 +65,8 @@ int sender_load(struct sender *s, const struct solution *sol, struct err *e)
 
 	s->unshot_diffuse = lanes_new(sides * s->groups, &s->room[1], "unshot flux", e);
 	s->unshot_link = lanes_new(links * s->groups, &s->room[2], "unshot flux", e);
-	if (!s->unshot_diffuse || !s->unshot_link)
+	s->link_gain = mem_new(sides, sizeof *s->link_gain, "unshot flux", e);
+	if (!s->unshot_diffuse || !s->unshot_link || !s->link_gain)
 		return -1;
 	lanes_pack(s->unshot_diffuse, sol->unshot_diffuse, sides, s->bands);
 	lanes_pack(s->unshot_link, sol->unshot_link, links, s->bands);
@@ -180,6 +182,7 @@ static ALWAYS_INLINE void land_special(const struct landing l, uint64_t run, uin
 	}
 	size_t at = 2 * (size_t)(link & ~RUN_GUESSED) + (size_t)l.freshness;
 	l.s->unshot_link[at * l.groups + l.group] += lobes;
+	l.s->link_gain[target] += lanes_total(&lobes, 1);
 	sum->kept[1] += lobes;
 	if (link & RUN_GUESSED)
 		sum->guessed += lobes;

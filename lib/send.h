@@ -19,6 +19,8 @@ struct sender {
 	lanes *part;             /* [2 materials][PARTS][groups] of flux arriving */
 	lanes *unshot_diffuse;   /* [2P][groups] as in solution.h, see sender_load */
 	lanes *unshot_link;      /* [links][2][groups] */
+	double *link_gain;       /* [2P] flux that came to the links of a side, to rounding,
+	                            since the owner set it to 0 */
 	void *room[3];           /* memory of these */
 	double *chain_flux;      /* [chains][bands], 0 between rows */
 	uint32_t *touched;       /* chains with flux */
