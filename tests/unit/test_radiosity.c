@@ -103,14 +103,27 @@ static void furnace_by_hemicubes(void **state)
 	furnace(&cubes, .05);
 }
 
+/* Band k like band 0, but emission k + 1 times. */
+static void spread_bands(struct materials *mt)
+{
+	double *coefficient[] = { mt->rho_d, mt->tau_d, mt->rho_s, mt->tau_s, mt->emission };
+
+	for (size_t c = 0; c < sizeof coefficient / sizeof *coefficient; c++)
+		for (size_t side = 0; side < 2 * mt->n; side++)
+			for (int k = 1; k < mt->bands; k++) {
+				double *x = coefficient[c] + side * (size_t)mt->bands;
+				x[k] = x[0] * (coefficient[c] == mt->emission ? k + 1 : 1);
+			}
+}
+
 /* A mirror-walled box with a sheet of all kinds of material across it. */
-static void plates_model(struct model *m, double lobe_exponent)
+static void plates_model(struct model *m, double lobe_exponent, int bands)
 {
 	const uint32_t material[6] = { 0, 0, 0, 0, 1, 2 };
 	const double at[3] = { 0, 0, .5 }, x[3] = { 1, 0, 0 }, y[3] = { 0, 1, 0 };
 	struct materials *mt = &m->material;
 
-	grid_new(m, 7, 2, 4, 1);
+	grid_new(m, 7, 2, 4, bands);
 	grid_box(m, 2, material, zero, one);
 	grid_quad(m, 2, 3, at, x, y);
 	for (size_t k = 0; k < 3; k++)
@@ -124,6 +137,7 @@ static void plates_model(struct model *m, double lobe_exponent)
 	}
 	for (int s = 0; s < 2; s++)
 		mt->alpha[6 + s] = mt->beta[6 + s] = lobe_exponent;
+	spread_bands(mt);
 	grid_end(m);
 }
 
@@ -132,7 +146,7 @@ static void plates(const struct ff_options *o, double lobe_exponent, double tole
 {
 	struct model m;
 
-	plates_model(&m, lobe_exponent);
+	plates_model(&m, lobe_exponent, 1);
 	const double expected[4] = { 1.4063777596075226, .3270645952575634, .8127555192150451,
 		.8176614881439084 };
 	const uint32_t side[4] = { 2 * 6 + 1, 2 * 6, 2 * 4, 2 * 5 };
@@ -160,6 +174,29 @@ static void plates_by_hemicubes(void **state)
 	plates(&cubes, (double)INFINITY, .01);
 	plates(&cubes, 1, .01);
 	plates(&cubes, 10, .01);
+}
+
+/* Bands are independent, in the same vector or not. */
+static void six_bands(void **state)
+{
+	struct model m;
+	struct ff f;
+	struct ff_stats stats;
+	struct solution s;
+
+	(void)state;
+	plates_model(&m, 10, 6);
+	memory_ff(&m, &rays, &f, &stats);
+	solution_of(&m, &f, &s);
+	for (size_t i = 0; i < 2 * m.elements; i++)
+		for (int k = 1; k < 6; k++) {
+			double h = (k + 1) * solution_irradiance(&s, i, 0), e = (k + 1) * s.error[6 * i];
+			assert_true(fabs(solution_irradiance(&s, i, k) - h) <= 1e-12 * h);
+			assert_true(fabs(s.error[6 * i + (size_t)k] - e) <= 1e-5 * e);
+		}
+	solution_free(&s);
+	ff_free(&f);
+	model_free(&m);
 }
 
 /* Through a file whose receivers are patches or elements. */
@@ -203,7 +240,7 @@ static void patches_as_receivers(const struct ff_options *o, double exponent, do
 	struct ff_stats stats;
 	struct solution memory, elements, patches;
 
-	plates_model(&m, exponent);
+	plates_model(&m, exponent, 1);
 	for (size_t i = 0; i < m.material.n; i++)
 		m.material.name[i] = strdup("material");
 	for (size_t i = 0; i < m.surface.n; i++)
@@ -295,6 +332,7 @@ int main(void)
 		cmocka_unit_test(furnace_by_hemicubes),
 		cmocka_unit_test(plates_by_rays),
 		cmocka_unit_test(plates_by_hemicubes),
+		cmocka_unit_test(six_bands),
 		cmocka_unit_test(patches_as_receivers_f32),
 		cmocka_unit_test(patches_as_receivers_f64),
 		cmocka_unit_test(shards_of_two_kinds),
