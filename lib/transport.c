@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "bsdf.h"
+#include "lanes.h"
 #include "par.h"
 
 static const char what[] = "form factors by patch";
@@ -265,59 +266,68 @@ static inline uint32_t target_of(const struct transport *t, const struct ff *f, 
 	return f->to_patches ? column : 2 * t->m->element_patch[column >> 1] + (column & 1);
 }
 
-/* Entries come patch-side by patch-side. No branch depends on where one ends. */
+/* Entries come patch-side by patch-side. */
 struct runs {
 	uint32_t *target;
-	double *sum;             /* NULL: not wanted */
+	double *sum;
 	size_t n;
 	uint32_t last;
 	double so_far;
 };
 
-static inline void add_entry(struct runs *r, uint32_t target, double value)
+/* No branch depends on where a run ends, which cannot be foreseen. Inlined with
+ * constant `sums`: whether they are wanted. */
+static ALWAYS_INLINE void add_entry(struct runs *r, uint32_t target, double value, int sums)
 {
-	const double keep[2] = { 0, r->so_far };
+	int is_new = target != r->last;
 
-	r->so_far = keep[target == r->last] + value;
-	r->n += target != r->last;
+	r->n += (size_t)is_new;
 	r->last = target;
 	r->target[r->n - 1] = target;
-	if (r->sum)
+	if (sums) {
+		r->so_far = r->so_far * (1 - is_new) + value;
 		r->sum[r->n - 1] = r->so_far;
+	}
 }
 
-static void add_list(const struct transport *t, const struct ff *f, uint64_t b, struct runs *r)
+static ALWAYS_INLINE void add_list(const struct transport *t, const struct ff *f, uint64_t b,
+                                   struct runs *to, int sums)
 {
 	const uint32_t *column = f->column + ff_block_column(f)[b];
 	uint64_t first = f->block_start[b], n = f->block_start[b + 1] - first;
+	struct runs r = *to;
 
 	for (uint64_t i = 0; i < n; i++)
-		add_entry(r, target_of(t, f, column[i]), r->sum ? ff_value(f, first + i) : 0);
+		add_entry(&r, target_of(t, f, column[i]), sums ? ff_value(f, first + i) : 0, sums);
+	*to = r;
 }
 
-static void add_spans(const struct transport *t, const struct ff *f, uint64_t b, struct runs *r)
+static ALWAYS_INLINE void add_spans(const struct transport *t, const struct ff *f, uint64_t b,
+                                    struct runs *to, int sums)
 {
 	struct ff_span s;
+	struct runs r = *to;
 
 	for (struct ff_cursor c = ff_begin(f, b); ff_next(&c, &s);)
 		for (uint32_t k = 0; k < s.count; k++)
-			add_entry(r, target_of(t, f, s.column + 2 * k),
-			          r->sum ? ff_value(f, s.entry + k) : 0);
+			add_entry(&r, target_of(t, f, s.column + 2 * k),
+			          sums ? ff_value(f, s.entry + k) : 0, sums);
+	*to = r;
 }
 
 /* A block's entries summed by patch-side into scratch. */
-static struct runs sum_block(const struct pass *p, const struct block *block, int thread,
-                             int sums)
+static ALWAYS_INLINE struct runs sum_block(const struct pass *p, const struct block *block,
+                                           int thread, int sums)
 {
 	const struct transport *t = p->t;
 	const struct ff *f = t->shard[block->shard];
 	size_t at = (size_t)thread * 2 * t->m->patches;
-	struct runs r = { p->target + at, sums ? p->sum + at : NULL, 0, UINT32_MAX, 0 };
+	struct runs r = { p->target + at, p->sum + at, 0, UINT32_MAX, 0 };
 
 	if (ff_has_spans(f, block->local))
-		add_spans(t, f, block->local, &r);
+		add_spans(t, f, block->local, &r, sums);
 	else
-		add_list(t, f, block->local, &r);
+		add_list(t, f, block->local, &r, sums);
 	return r;
 }
 
