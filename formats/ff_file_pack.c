@@ -2,6 +2,8 @@
 
 #include <stdlib.h>
 
+#include "../lib/check.h"
+
 void ff_packed_free(struct ff_packed *p)
 {
 	struct vec *v[] = { &p->word, &p->word_start, &p->column, &p->value, &p->start, &p->scale };
@@ -45,7 +47,8 @@ static int pack_block(const struct ff *f, uint64_t block, struct vec *word, stru
 int ff_pack_columns(const struct ff *batch, struct ff_packed *p, struct err *e)
 {
 	p->word.n = p->word_start.n = 0;
-	if (vec_reserve(&p->word_start, batch->blocks + 1, sizeof(uint64_t), e))
+	if (check_starts("block_start", batch->block_start, batch->blocks, batch->entries, 0, e) ||
+	    vec_reserve(&p->word_start, batch->blocks + 1, sizeof(uint64_t), e))
 		return -1;
 	uint64_t *start = p->word_start.data;
 	start[0] = 0;
@@ -100,7 +103,8 @@ int ff_sum_by_patch(const struct ff *batch, const struct model *m, struct ff_pac
                     struct ff *out, struct err *e)
 {
 	p->column.n = p->value.n = 0;
-	if (vec_reserve(&p->start, batch->blocks + 1, sizeof(uint64_t), e) ||
+	if (check_starts("block_start", batch->block_start, batch->blocks, batch->entries, 0, e) ||
+	    vec_reserve(&p->start, batch->blocks + 1, sizeof(uint64_t), e) ||
 	    vec_reserve(&p->scale, batch->rows, sizeof(double), e))
 		return -1;
 	uint64_t *start = p->start.data;

@@ -160,9 +160,6 @@ static int put_link_rows(struct ff_writer *w, const struct ff *b, struct err *e)
 
 static int put_values(struct ff_writer *w, const struct ff *b, struct err *e)
 {
-	if (b->entries && !(w->f64 ? (const void *)b->value64 : (const void *)b->value))
-		return err_set(e, "%s: array value: a batch has the other precision",
-		               container_writer_path(w->container));
 	return w->f64 ? put(w, VALUE, b->value64, b->entries, sizeof *b->value64, e)
 	              : put(w, VALUE, b->value, b->entries, sizeof *b->value, e);
 }
@@ -218,6 +215,9 @@ int ff_file_append(struct ff_writer *w, const struct ff *batch, struct err *e)
 {
 	struct ff by_patch;
 
+	if (batch->entries && (w->f64 ? !batch->value64 : !batch->value))
+		return err_set(e, "%s: array value: a batch has the other precision",
+		               container_writer_path(w->container));
 	if (batch->to_patches && !w->to_patches)
 		return err_set(e, "%s: array column: a batch has patches, not elements",
 		               container_writer_path(w->container));

@@ -1,8 +1,8 @@
 /* The pass over elements: irradiance from the flux that every row has sent.
  *
  * Threads own ranges of receivers, so sums do not depend on their number; each reads
- * only the entries that land in its range. A range fits the cache: rows come by one
- * after the other, and what they add to stays near. */
+ * only the entries that land in its range. */
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,10 +13,26 @@
 #include "radiosity.h"
 #include "send.h"
 
-/* Receivers of a range: their sums are a good part of a core's second-level cache. */
-enum { RANGE = 1 << 13 };
+/* Feeds whose entries are on the way from memory. */
+enum { AHEAD = 8 };
 
 enum part { DIRECT, CAUSTIC, INDIRECT, H_PARTS };
+
+/* A block that carries flux: what it adds to every receiver it lands on, per unit of
+ * value. */
+struct feed {
+	lanes fresh, mixed;
+	lanes_f32 variance;
+	const struct ff *f;
+	uint64_t block;              /* of f */
+	uint8_t to_fresh, carries;   /* enum part; bit 0: fresh flux, bit 1: mixed */
+};
+
+/* Where a feed's entries in a range begin. */
+struct place {
+	uint64_t word, entry;        /* of f */
+	uint32_t done;               /* entries of the span that begins there */
+};
 
 struct gather {
 	const struct transport *t;
@@ -24,125 +40,163 @@ struct gather {
 	int to_patches;
 	size_t receivers;            /* elements or patches, 2 sides each */
 	const double *block_flux[2]; /* [blocks][bands] by freshness, over the block's sum */
-	const uint8_t *carries;      /* [blocks] bit 0: fresh flux, bit 1: mixed */
-	size_t ranges;
+	size_t ranges;               /* one a thread */
 	uint32_t *cut;               /* [ranges+1] receivers */
+	size_t feeds;
+	struct feed *feed;
 	lanes *flux[H_PARTS];        /* [2][receivers] by side: landing flux */
 	lanes_f32 *variance;         /* [2][receivers], in units of `unit` */
 	double unit;                 /* the largest that a whole block adds */
 	int first_band;              /* of the four in work */
+	double bytes;
 };
 
 /* ---- a block into a range ---- */
 
-/* What a block adds to every receiver it lands on, per unit of value. */
-struct scales {
-	lanes fresh, mixed;
-	lanes_f32 variance;
-	lanes *to_fresh, *to_mixed;
-	lanes_f32 *to_variance;
+/* Where a feed adds. */
+struct into {
+	lanes *fresh, *mixed;
+	lanes_f32 *variance;
 };
 
-static inline void add(const struct scales *s, size_t at, double v, int fresh, int mixed)
+static ALWAYS_INLINE void add(const struct feed *x, const struct into *to, size_t at,
+                              double v, int fresh, int mixed)
 {
 	if (fresh)
-		s->to_fresh[at] += s->fresh * v;
+		to->fresh[at] += x->fresh * v;
 	if (mixed)
-		s->to_mixed[at] += s->mixed * v;
-	s->to_variance[at] += s->variance * (float)v;
+		to->mixed[at] += x->mixed * v;
+	to->variance[at] += x->variance * (float)v;
 }
 
-/* Entries of a list or a span, and what they hold. */
-struct stretch {
-	const uint32_t *column;      /* [count], NULL: receivers of a span, from `at` on */
-	size_t at, back;             /* `back` lies between the two sides of a receiver */
-	const float *v32;            /* one of the two is NULL */
-	const double *v64;
-	size_t count;
-};
-
-/* Inlined with constants, so that each case is a loop of its own. */
-static inline void add_as(const struct scales *s, const struct stretch *x, int list, int f32,
-                          int fresh, int mixed)
+/* A feed's entries from p on that lie below a receiver. Inlined with constants, so
+ * that each case is a loop of its own. */
+static ALWAYS_INLINE void add_list(const struct gather *g, const struct feed *x,
+                                   const struct into *to, struct place p, uint32_t below,
+                                   int f32, int fresh, int mixed)
 {
-	for (size_t i = 0; i < x->count; i++) {
-		uint32_t c = list ? x->column[i] : 0;
-		size_t at = list ? (c >> 1) + (c & 1 ? x->back : 0) : x->at + i;
-		add(s, at, f32 ? (double)x->v32[i] : x->v64[i], fresh, mixed);
+	const struct ff *f = x->f;
+	const uint32_t *column = f->column + p.word;
+	const uint64_t n = f->block_start[x->block + 1] - p.entry;
+
+	for (uint64_t i = 0; i < n && column[i] >> 1 < below; i++) {
+		size_t at = (column[i] >> 1) + (column[i] & 1 ? g->receivers : 0);
+		double v = f32 ? (double)f->value[p.entry + i] : f->value64[p.entry + i];
+		add(x, to, at, v, fresh, mixed);
 	}
 }
 
-static void add_stretch(const struct scales *s, const struct stretch *x, int carries)
+static ALWAYS_INLINE void add_spans(const struct gather *g, const struct feed *x,
+                                    const struct into *to, struct place p, uint32_t below,
+                                    int f32, int fresh, int mixed)
 {
-	if (x->column && x->v32 && carries == 2)
-		add_as(s, x, 1, 1, 0, 1);
-	else if (x->column && x->v32)
-		add_as(s, x, 1, 1, carries & 1, carries >> 1);
-	else if (x->column)
-		add_as(s, x, 1, 0, carries & 1, carries >> 1);
-	else if (x->v32)
-		add_as(s, x, 0, 1, carries & 1, carries >> 1);
+	const struct ff *f = x->f;
+	const uint64_t end = ff_block_column(f)[x->block + 1];
+
+	for (; p.word < end; p.word += 2, p.done = 0) {
+		uint32_t first = (f->column[p.word] >> 1) + p.done;
+		uint32_t last = first + f->column[p.word + 1] - p.done;
+		size_t back = f->column[p.word] & 1 ? g->receivers : 0;
+		if (first >= below)
+			break;
+		if (last > below)
+			last = below;
+		for (size_t at = first + back; at < last + back; at++, p.entry++) {
+			double v = f32 ? (double)f->value[p.entry] : f->value64[p.entry];
+			add(x, to, at, v, fresh, mixed);
+		}
+	}
+}
+
+static ALWAYS_INLINE void add_as(const struct gather *g, const struct feed *x,
+                                 const struct into *to, struct place p, uint32_t below,
+                                 int f32, int fresh, int mixed)
+{
+	if (ff_has_spans(x->f, x->block))
+		add_spans(g, x, to, p, below, f32, fresh, mixed);
 	else
-		add_as(s, x, 0, 0, carries & 1, carries >> 1);
+		add_list(g, x, to, p, below, f32, fresh, mixed);
 }
 
-static struct stretch stretch_at(const struct gather *g, const struct ff *f, uint64_t entry,
-                                 uint64_t count)
+static void add_feed(const struct gather *g, const struct feed *x, struct place p,
+                     uint32_t below)
 {
-	return (struct stretch){ .back = g->receivers, .v32 = f->value ? f->value + entry : NULL,
-	                         .v64 = f->value ? NULL : f->value64 + entry,
-	                         .count = (size_t)count };
+	const struct into to = { g->flux[x->to_fresh], g->flux[INDIRECT], g->variance };
+
+	if (x->f->value && x->carries == 2)
+		add_as(g, x, &to, p, below, 1, 0, 1);
+	else if (x->f->value && x->carries == 1)
+		add_as(g, x, &to, p, below, 1, 1, 0);
+	else if (x->f->value)
+		add_as(g, x, &to, p, below, 1, 1, 1);
+	else
+		add_as(g, x, &to, p, below, 0, x->carries & 1, x->carries >> 1);
 }
 
-/* First of a list's words at or beyond a receiver: ranges are whole patches, so that
- * both sides of a patch are on one side of it. */
-static const uint32_t *seek(const uint32_t *word, const uint32_t *end, uint32_t receiver)
+static void seek_span(const struct feed *x, uint32_t receiver, struct place *p)
 {
-	size_t n = (size_t)(end - word);
+	const struct ff *f = x->f;
+	const uint64_t end = ff_block_column(f)[x->block + 1];
+
+	for (; p->word < end; p->word += 2) {
+		uint32_t first = f->column[p->word] >> 1, count = f->column[p->word + 1];
+		if (first >= receiver)
+			return;
+		p->done = receiver - first < count ? receiver - first : 0;
+		p->entry += p->done ? p->done : count;
+		if (p->done)
+			return;
+	}
+}
+
+/* Ranges are whole patches: both sides of a patch are on one side of a bound. */
+static void seek_word(const struct feed *x, uint32_t receiver, struct place *p)
+{
+	const uint32_t *word = x->f->column + p->word;
+	uint64_t n = ff_block_column(x->f)[x->block + 1] - p->word, at = 0;
 
 	while (n) {
-		size_t half = n / 2;
-		int below = word[half] >> 1 < receiver;
-		word += below ? half + 1 : 0;
+		uint64_t half = n / 2;
+		int below = word[at + half] >> 1 < receiver;
+		at += below ? half + 1 : 0;
 		n = below ? n - half - 1 : half;
 	}
-	return word;
+	p->word += at;
+	p->entry += at;
 }
 
-static void add_list(const struct gather *g, const struct ff *f, uint64_t b, size_t range,
-                     const struct scales *s, int carries)
+/* A feed's first entry at or beyond a receiver. It and what follows is fetched. */
+static struct place find_place(const struct feed *x, uint32_t receiver)
 {
-	const uint64_t *word = ff_block_column(f) + b;
-	const uint32_t *begin = f->column + word[0], *end = f->column + word[1];
-	const uint32_t *first = seek(begin, end, g->cut[range]);
-	const uint32_t *last = seek(first, end, g->cut[range + 1]);
-	struct stretch x = stretch_at(g, f, f->block_start[b] + (uint64_t)(first - begin),
-	                              (uint64_t)(last - first));
+	const struct ff *f = x->f;
+	struct place p = { ff_block_column(f)[x->block], f->block_start[x->block], 0 };
 
-	x.column = first;
-	add_stretch(s, &x, carries);
+	if (receiver && ff_has_spans(f, x->block))
+		seek_span(x, receiver, &p);
+	else if (receiver)
+		seek_word(x, receiver, &p);
+	__builtin_prefetch(f->column + p.word);
+	__builtin_prefetch(f->value ? (const void *)(f->value + p.entry) : f->value64 + p.entry);
+	return p;
 }
 
-static void add_spans(const struct gather *g, const struct ff *f, uint64_t b, size_t range,
-                      const struct scales *s, int carries)
+static void add_range(void *arg, size_t begin, size_t end, int thread)
 {
-	uint32_t low = g->cut[range], high = g->cut[range + 1];
-	struct ff_span span;
+	const struct gather *g = arg;
+	struct place place[AHEAD];
 
-	for (struct ff_cursor c = ff_begin(f, b); ff_next(&c, &span);) {
-		uint32_t begin = span.column >> 1, end = begin + span.count;
-		uint32_t from = begin > low ? begin : low, to = end < high ? end : high;
-		if (begin >= high)
-			break;
-		if (from >= to)
-			continue;
-		struct stretch x = stretch_at(g, f, span.entry + (from - begin), to - from);
-		x.at = from + (span.column & 1 ? g->receivers : 0);
-		add_stretch(s, &x, carries);
-	}
+	(void)thread;
+	for (size_t range = begin; range < end; range++)
+		for (size_t i = 0; i < g->feeds + AHEAD; i++) {
+			struct place *p = &place[i % AHEAD];
+			if (i >= AHEAD)
+				add_feed(g, &g->feed[i - AHEAD], *p, g->cut[range + 1]);
+			if (i < g->feeds)
+				*p = find_place(&g->feed[i], g->cut[range]);
+		}
 }
 
-/* ---- all blocks ---- */
+/* ---- what blocks carry ---- */
 
 static enum part part_of(const struct transport *t, uint32_t row, uint32_t chain)
 {
@@ -151,11 +205,12 @@ static enum part part_of(const struct transport *t, uint32_t row, uint32_t chain
 
 /* Variance of an element's irradiance from the sampling of the rows, as if each
  * sample were independent (stratification makes it smaller): a row of n samples
- * that sends flux U, of which f lands here, adds U^2 f / n. */
+ * that sends flux U, of which f lands here, adds U^2 f / n; one without samples, 0. */
 static lanes variance_of(const struct gather *g, uint32_t row, uint64_t b)
 {
 	const struct transport *t = g->t;
-	double one = t->block[t->row_block[row]].sum / t->row_samples[row];
+	uint32_t samples = t->row_samples[row];
+	double one = samples ? t->block[t->row_block[row]].sum / samples : 0;
 	lanes v = { 0 };
 
 	for (int k = 0; k < LANES && g->first_band + k < g->s->bands; k++) {
@@ -164,63 +219,6 @@ static lanes variance_of(const struct gather *g, uint32_t row, uint64_t b)
 		v[k] = all * all * one;
 	}
 	return v;
-}
-
-static void set_scales(const struct gather *g, uint32_t row, uint64_t b, struct scales *s)
-{
-	const struct transport *t = g->t;
-	size_t at = b * (size_t)g->s->bands + (size_t)g->first_band;
-
-	*s = (struct scales){ .to_fresh = g->flux[part_of(t, row, t->block[b].chain)],
-	                      .to_mixed = g->flux[INDIRECT], .to_variance = g->variance };
-	for (int k = 0; k < LANES && g->first_band + k < g->s->bands; k++) {
-		s->fresh[k] = g->block_flux[0][at + (size_t)k];
-		s->mixed[k] = g->block_flux[1][at + (size_t)k];
-	}
-	s->variance = __builtin_convertvector(variance_of(g, row, b) * (1 / g->unit), lanes_f32);
-}
-
-static void add_range(void *arg, size_t begin, size_t end, int thread)
-{
-	const struct gather *g = arg;
-	const struct transport *t = g->t;
-	struct scales s;
-
-	(void)thread;
-	for (size_t range = begin; range < end; range++)
-		for (uint32_t row = 0; row < t->rows; row++)
-			for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
-				const struct ff *f = t->shard[t->block[b].shard];
-				uint64_t local = t->block[b].local;
-				if (!g->carries[b])
-					continue;
-				set_scales(g, row, b, &s);
-				if (ff_has_spans(f, local))
-					add_spans(g, f, local, range, &s, g->carries[b]);
-				else
-					add_list(g, f, local, range, &s, g->carries[b]);
-			}
-}
-
-/* ---- irradiance ---- */
-
-static void put_bands(const struct gather *g)
-{
-	const struct model *m = g->t->m;
-	double *to[H_PARTS] = { g->s->direct, g->s->caustic, g->s->indirect };
-	size_t bands = (size_t)g->s->bands;
-
-	for (size_t es = 0; es < 2 * m->elements; es++) {
-		uint32_t element = (uint32_t)(es >> 1), patch = m->element_patch[element];
-		size_t side = (es & 1) * g->receivers, at = es * bands + (size_t)g->first_band;
-		size_t from = side + (g->to_patches ? patch : element);
-		double area = g->to_patches ? m->patch_area[patch] : m->element_area[element];
-		for (int k = 0; k < LANES && g->first_band + k < g->s->bands; k++, at++) {
-			for (int p = 0; p < H_PARTS; p++)
-				to[p][at] = g->flux[p][from][k] / area;
-			g->s->error[at] = sqrt((double)g->variance[from][k] * g->unit) / area;
-		}
-	}
 }
 
 /* Float sums of variances stay in range whatever the unit of flux is. */
@@ -235,30 +233,112 @@ static void set_unit(struct gather *g)
 			for (int k = 0; k < LANES; k++)
 				g->unit = fmax(g->unit, v[k]);
 		}
-	if (!(g->unit > 0))
+	if (!(g->unit >= DBL_MIN))
 		g->unit = 1;
+}
+
+static void set_feed(const struct gather *g, uint32_t row, uint64_t b, uint8_t carries,
+                     struct feed *x)
+{
+	const struct block *block = &g->t->block[b];
+	size_t at = b * (size_t)g->s->bands + (size_t)g->first_band;
+
+	*x = (struct feed){ .f = g->t->shard[block->shard], .block = block->local,
+	                    .to_fresh = (uint8_t)part_of(g->t, row, block->chain),
+	                    .carries = carries };
+	for (int k = 0; k < LANES && g->first_band + k < g->s->bands; k++) {
+		x->fresh[k] = g->block_flux[0][at + (size_t)k];
+		x->mixed[k] = g->block_flux[1][at + (size_t)k];
+	}
+	x->variance = __builtin_convertvector(variance_of(g, row, b) * (1 / g->unit), lanes_f32);
+}
+
+/* Blocks with flux in the four bands in work. */
+static void set_feeds(struct gather *g)
+{
+	const struct transport *t = g->t;
+	size_t bands = (size_t)g->s->bands;
+
+	g->feeds = 0;
+	for (uint32_t row = 0; row < t->rows; row++)
+		for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
+			unsigned carries = 0;
+			for (size_t k = (size_t)g->first_band; k < bands &&
+			     k < (size_t)g->first_band + LANES; k++)
+				carries |= (g->block_flux[0][b * bands + k] > 0) |
+				           (unsigned)(g->block_flux[1][b * bands + k] > 0) << 1;
+			if (carries)
+				set_feed(g, row, b, (uint8_t)carries, &g->feed[g->feeds++]);
+		}
+}
+
+/* ---- irradiance ---- */
+
+static void put_bands(void *arg, size_t begin, size_t end, int thread)
+{
+	const struct gather *g = arg;
+	const struct model *m = g->t->m;
+	double *to[H_PARTS] = { g->s->direct, g->s->caustic, g->s->indirect };
+	size_t bands = (size_t)g->s->bands;
+
+	(void)thread;
+	for (size_t es = begin; es < end; es++) {
+		uint32_t element = (uint32_t)(es >> 1), patch = m->element_patch[element];
+		size_t side = (es & 1) * g->receivers, at = es * bands + (size_t)g->first_band;
+		size_t from = side + (g->to_patches ? patch : element);
+		double area = g->to_patches ? m->patch_area[patch] : m->element_area[element];
+		for (int k = 0; k < LANES && g->first_band + k < g->s->bands; k++, at++) {
+			for (int p = 0; p < H_PARTS; p++)
+				to[p][at] = g->flux[p][from][k] / area;
+			g->s->error[at] = sqrt((double)g->variance[from][k] * g->unit) / area;
+		}
+	}
+}
+
+/* Bytes of the columns and values that are read. */
+static double bytes_of(const struct gather *g)
+{
+	double bytes = 0;
+
+	for (size_t i = 0; i < g->feeds; i++) {
+		const struct ff *f = g->feed[i].f;
+		const uint64_t *word = ff_block_column(f) + g->feed[i].block;
+		const uint64_t *entry = f->block_start + g->feed[i].block;
+		bytes += (double)(word[1] - word[0]) * sizeof *f->column +
+		         (double)(entry[1] - entry[0]) *
+		         (f->value ? sizeof *f->value : sizeof *f->value64);
+	}
+	return bytes;
 }
 
 static int gather_bands(struct gather *g, int threads, struct err *e)
 {
 	size_t n = 2 * g->receivers;
-	void *room, *variance;
+	void *room, *variance, *feed;
 	lanes *at = lanes_new(H_PARTS * n, &room, "irradiance", e);
 
 	g->variance = (lanes_f32 *)lanes_new((n + 1) / 2, &variance, "irradiance", e);
-	for (g->first_band = 0; at && g->variance && g->first_band < g->s->bands;
+	g->feed = (struct feed *)lanes_new(g->t->blocks * (sizeof *g->feed / sizeof(lanes)), &feed,
+	                                   "flux by chain", e);
+	int bad = !at || !g->variance || !g->feed;
+	for (int p = 0; !bad && p < H_PARTS; p++)
+		g->flux[p] = at + (size_t)p * n;
+	for (g->first_band = 0; !bad && g->first_band < g->s->bands;
 	     g->first_band += LANES) {
-		for (int p = 0; p < H_PARTS; p++)
-			g->flux[p] = at + (size_t)p * n;
-		memset(at, 0, H_PARTS * n * sizeof *at);
-		memset(g->variance, 0, n * sizeof *g->variance);
+		if (g->first_band) {
+			memset(at, 0, H_PARTS * n * sizeof *at);
+			memset(g->variance, 0, n * sizeof *g->variance);
+		}
 		set_unit(g);
+		set_feeds(g);
 		par_for(g->ranges, 1, threads, add_range, g, NULL);
-		put_bands(g);
+		par_for(g->s->element_sides, 4096, threads, put_bands, g, NULL);
+		g->bytes += bytes_of(g);
 	}
 	free(room);
 	free(variance);
-	return at && g->variance ? 0 : -1;
+	free(feed);
+	return bad ? -1 : 0;
 }
 
 /* ---- flux by block ---- */
@@ -284,44 +364,11 @@ static int block_fluxes(const struct transport *t, const struct solution *s, dou
 	return bad;
 }
 
-static void set_carries(const struct transport *t, const struct solution *s,
-                        double *const flux[2], uint8_t *carries)
-{
-	size_t bands = (size_t)s->bands;
-
-	for (size_t b = 0; b < t->blocks; b++)
-		for (size_t i = b * bands; i < (b + 1) * bands; i++)
-			for (int fresh = 0; fresh < 2; fresh++)
-				if (flux[fresh][i] > 0)
-					carries[b] |= (uint8_t)(1 << fresh);
-}
-
-/* Bytes of the columns and values that are read. */
-static double bytes_of(const struct gather *g)
-{
-	const struct transport *t = g->t;
-	double bytes = 0;
-
-	for (size_t b = 0; b < t->blocks; b++) {
-		const struct ff *f = t->shard[t->block[b].shard];
-		const uint64_t *word = ff_block_column(f) + t->block[b].local;
-		const uint64_t *entry = f->block_start + t->block[b].local;
-		if (g->carries[b])
-			bytes += (double)(word[1] - word[0]) * sizeof *f->column +
-			         (double)(entry[1] - entry[0]) *
-			         (f->value ? sizeof *f->value : sizeof *f->value64);
-	}
-	return bytes * (double)lanes_groups(g->s->bands);
-}
-
-/* Ranges of whole patches, at least one a thread. */
-static int cut_ranges(struct gather *g, int threads, struct err *e)
+static int cut_ranges(struct gather *g, struct err *e)
 {
 	const struct model *m = g->t->m;
 	uint32_t i = 0;
 
-	g->ranges = (g->receivers + RANGE - 1) / RANGE;
-	g->ranges = (g->ranges + (size_t)threads - 1) / (size_t)threads * (size_t)threads;
 	if (!(g->cut = mem_new(g->ranges + 1, sizeof *g->cut, "irradiance", e)))
 		return -1;
 	for (uint32_t p = 0; p <= m->patches; p++) {
@@ -336,22 +383,16 @@ int radiosity_gather(struct solution *s, const struct transport *t, int threads,
                      struct radiosity_report *r, struct err *e)
 {
 	double *flux[2];
-	uint8_t *carries = mem_new(t->blocks, 1, "irradiance", e);
 	struct gather g = { .t = t, .s = s, .to_patches = t->shard[0]->to_patches,
-	                    .carries = carries };
+	                    .ranges = threads > 1 ? (size_t)threads : 1 };
 
 	g.receivers = g.to_patches ? t->m->patches : t->m->elements;
 	for (int i = 0; i < 2; i++)
 		g.block_flux[i] = flux[i] = mem_new(t->blocks, (size_t)s->bands * sizeof(double),
 		                                    "flux by chain", e);
-	int bad = !carries || !flux[0] || !flux[1] || block_fluxes(t, s, flux, e) ||
-	          cut_ranges(&g, threads > 1 ? threads : 1, e);
-	if (!bad) {
-		set_carries(t, s, flux, carries);
-		bad = gather_bands(&g, threads, e);
-		r->gather_bytes = bytes_of(&g);
-	}
-	free(carries);
+	int bad = !flux[0] || !flux[1] || block_fluxes(t, s, flux, e) ||
+	          cut_ranges(&g, e) || gather_bands(&g, threads, e);
+	r->gather_bytes = g.bytes;
 	free(g.cut);
 	free(flux[0]);
 	free(flux[1]);

@@ -3,10 +3,14 @@
 #define TWOPASS_LANES_H
 
 #include <stdint.h>
+#include <string.h>
 
 #include "mem.h"
 
 enum { LANES = 4 };
+
+/* For loops that are to be made anew for each set of constants. */
+#define ALWAYS_INLINE inline __attribute__((always_inline))
 
 typedef double lanes __attribute__((vector_size(32)));
 typedef float lanes_f32 __attribute__((vector_size(16)));
@@ -23,6 +27,32 @@ static inline lanes *lanes_new(size_t n, void **room, const char *what, struct e
 {
 	*room = mem_new(n + 1, sizeof(lanes), what, e); /* calloc aligns to 16 bytes only */
 	return *room ? (lanes *)(((uintptr_t)*room + 31) & ~(uintptr_t)31) : NULL;
+}
+
+/* Rows of `bands` doubles to rows of vectors, padded with what is there (0), and back. */
+static inline void lanes_pack(lanes *to, const double *from, size_t rows, int bands)
+{
+	size_t groups = lanes_groups(bands), n = (size_t)bands;
+
+	for (size_t i = 0; i < rows; i++)
+		memcpy(to + i * groups, from + i * n, n * sizeof *from);
+}
+
+static inline void lanes_unpack(double *to, const lanes *from, size_t rows, int bands)
+{
+	size_t groups = lanes_groups(bands), n = (size_t)bands;
+
+	for (size_t i = 0; i < rows; i++)
+		memcpy(to + i * n, from + i * groups, n * sizeof *to);
+}
+
+static inline double lanes_total(const lanes *x, size_t n)
+{
+	lanes sum = { 0 };
+
+	for (size_t i = 0; i < n; i++)
+		sum += x[i];
+	return sum[0] + sum[1] + sum[2] + sum[3];
 }
 
 #endif

@@ -66,6 +66,9 @@ struct solver {
 	struct sender sender;
 	struct components parts;
 	double *weight;          /* [2P] 1 / flux emitted in the side's component */
+	double *priority;        /* [2P] unshot flux by weight when the round began */
+	double *links;           /* [2P] unshot flux of a side's links then, all bands */
+	lanes unshot[GROUPS_MAX];/* in all, then */
 	double guessed, residual;
 };
 
@@ -78,48 +81,68 @@ static double total(const double *x, size_t n)
 	return sum;
 }
 
-/* Unshot flux of a patch-side over what its component emits. */
-static double priority(const struct solver *v, uint32_t ps)
+/* Unshot flux of the links of a patch-side. */
+static lanes link_unshot(const struct solver *v, uint32_t ps, size_t group)
 {
-	const struct solution *s = v->s;
-	size_t bands = (size_t)s->bands, at = ps * bands;
-	const double *diffuse = sender_unshot(&v->sender, ps);
-	uint64_t first = v->t->target_link[ps], n = v->t->target_link[ps + 1] - first;
-	double sum = 0;
+	const struct sender *s = &v->sender;
+	const uint64_t *first = v->t->target_link + ps;
+	lanes fresh = { 0 }, mixed = { 0 };
 
-	for (size_t k = 0; k < bands; k++)
-		sum += s->unshot_emission[at + k] + diffuse[k];
-	if (n)
-		sum += total(s->unshot_link + 2 * first * bands, 2 * n * bands);
-	return sum * v->weight[ps];
+	for (uint64_t l = 2 * first[0]; l < 2 * first[1]; l += 2) {
+		fresh += s->unshot_link[l * s->groups + group];
+		mixed += s->unshot_link[(l + 1) * s->groups + group];
+	}
+	return fresh + mixed;
 }
 
-/* Sends what `from` holds (and clears it) by a row, scaled per band. */
-static void shoot_row(struct solver *v, uint32_t row, int freshness, const double *from,
-                      const double *part, struct sent *sent)
+/* Unshot flux of a patch-side but for its links. */
+static double plain_unshot(const struct solver *v, uint32_t ps)
 {
-	double flux[BANDS_MAX], any = 0;
-	int bands = v->s->bands;
-	double *shot = v->s->shot + (2 * (size_t)row + (size_t)freshness) * (size_t)bands;
+	const struct sender *s = &v->sender;
 
-	for (int k = 0; k < bands; k++) {
-		flux[k] = from[k] * (part ? part[k] : 1);
-		shot[k] += flux[k];
-		any += flux[k];
+	return total(v->s->unshot_emission + ps * (size_t)s->bands, (size_t)s->bands) +
+	       lanes_total(s->unshot_diffuse + ps * s->groups, s->groups);
+}
+
+static double all_unshot(const struct solver *v, uint32_t ps)
+{
+	double links = 0;
+
+	for (size_t g = 0; g < v->sender.groups; g++) {
+		lanes x = link_unshot(v, ps, g);
+		links += lanes_total(&x, 1);
 	}
-	if (any > 0)
-		send_row(&v->sender, v->s, row, freshness, flux, sent);
+	return plain_unshot(v, ps) + links;
+}
+
+/* Sends what a side's unshot flux was by a row, scaled per band if `part` is given. */
+static void shoot_row(struct solver *v, uint32_t row, int freshness, const lanes *from,
+                      const lanes *part, struct sent *sent)
+{
+	lanes flux[GROUPS_MAX];
+	size_t groups = v->sender.groups, bands = (size_t)v->s->bands;
+	double *shot = v->s->shot + (2 * (size_t)row + (size_t)freshness) * bands;
+
+	for (size_t g = 0; g < groups; g++)
+		flux[g] = part ? from[g] * part[g] : from[g];
+	if (!(lanes_total(flux, groups) > 0))
+		return;
+	for (size_t k = 0; k < bands; k++)
+		shot[k] += ((const double *)flux)[k];
+	send_row(&v->sender, row, freshness, flux, sent);
 }
 
 /* The shares of a target's directional flux that leave by R and by T. */
-static void lobe_shares(const struct model *m, uint32_t ps, double *r, double *t)
+static void lobe_shares(const struct model *m, uint32_t ps, lanes share[2][GROUPS_MAX])
 {
 	const struct materials *mt = &m->material;
 	uint32_t material = model_patch_material(m, ps >> 1);
 	size_t at = material_at(mt, material, (int)(ps & 1));
 	int lobe_r = bsdf_has_lobe(mt, material, (int)(ps & 1), 0);
 	int lobe_t = bsdf_has_lobe(mt, material, (int)(ps & 1), 1);
+	double *r = (double *)share[0], *t = (double *)share[1];
 
+	memset(share, 0, 2 * sizeof *share);
 	for (int k = 0; k < m->bands; k++) {
 		double rho = lobe_r ? mt->rho_s[at + (size_t)k] : 0;
 		double tau = lobe_t ? mt->tau_s[at + (size_t)k] : 0;
@@ -128,70 +151,82 @@ static void lobe_shares(const struct model *m, uint32_t ps, double *r, double *t
 	}
 }
 
-static void shoot_links(struct solver *v, uint32_t ps, struct sent *sent, double *out)
+/* Moves unshot flux out of its array before it is sent: what comes back to the same
+ * side during the shot waits for the next. */
+static void take(lanes *from, lanes *to, lanes *out, size_t groups)
 {
-	const struct transport *t = v->t;
-	size_t bands = (size_t)v->s->bands;
-	double share[2][BANDS_MAX], now[BANDS_MAX];
-
-	lobe_shares(t->m, ps, share[0], share[1]);
-	for (uint64_t l = t->target_link[ps]; l < t->target_link[ps + 1]; l++)
-		for (int fresh = 0; fresh < 2; fresh++) {
-			double *u = v->s->unshot_link + (2 * l + (size_t)fresh) * bands;
-			if (!(total(u, bands) > 0))
-				continue;
-			for (size_t k = 0; k < bands; k++) {
-				now[k] = u[k];
-				out[k] += u[k];
-				u[k] = 0;
-			}
-			for (int way = 0; way < 2; way++)
-				if (t->link_row[2 * l + (size_t)way] != FF_NO_ROW)
-					shoot_row(v, t->link_row[2 * l + (size_t)way], fresh, now,
-					          share[way], sent);
-		}
+	for (size_t g = 0; g < groups; g++) {
+		to[g] = from[g];
+		out[g] += from[g];
+		from[g] = (lanes){ 0 };
+	}
 }
 
-/* Moves a side's unshot flux out of its array before it is sent: what comes back
- * to the same side during the shot waits for the next. */
-static void take(double *from, double *to, double *out, int bands)
+static void shoot_links(struct solver *v, uint32_t ps, struct sent *sent, lanes *out)
 {
-	for (int k = 0; k < bands; k++) {
-		to[k] = from[k];
-		out[k] += from[k];
-		from[k] = 0;
+	const struct transport *t = v->t;
+	size_t groups = v->sender.groups;
+	lanes share[2][GROUPS_MAX], now[GROUPS_MAX];
+
+	if (t->target_link[ps] == t->target_link[ps + 1])
+		return;
+	lobe_shares(t->m, ps, share);
+	for (uint64_t l = 2 * t->target_link[ps]; l < 2 * t->target_link[ps + 1]; l++) {
+		lanes *u = v->sender.unshot_link + l * groups;
+		if (!(lanes_total(u, groups) > 0))
+			continue;
+		take(u, now, out, groups);
+		for (uint64_t way = 0; way < 2; way++) {
+			uint32_t row = t->link_row[(l & ~(uint64_t)1) + way];
+			if (row != FF_NO_ROW)
+				shoot_row(v, row, (int)(l & 1), now, share[way], sent);
+		}
 	}
 }
 
 static void book(struct solver *v, const struct sent *sent, const double *out)
 {
 	struct solution *s = v->s;
+	const double *absorbed = (const double *)sent->absorbed, *lost = (const double *)sent->lost;
+	const double *escaped = (const double *)sent->escaped, *cut = (const double *)sent->cut;
+	const double *kept = (const double *)sent->kept;
 	int bands = s->bands;
 
 	for (int k = 0; k < bands; k++) {
-		double gone = sent->absorbed[k] + sent->escaped[k] + sent->lost[k] + sent->cut[k];
-		s->ledger[LEDGER_ABSORBED * bands + k] += sent->absorbed[k];
-		s->ledger[LEDGER_ESCAPED * bands + k] += sent->escaped[k];
-		s->ledger[LEDGER_LOST * bands + k] += sent->lost[k];
-		s->ledger[LEDGER_CUT * bands + k] += sent->cut[k];
-		v->guessed += sent->guessed[k];
+		double gone = absorbed[k] + escaped[k] + lost[k] + cut[k];
+		s->ledger[LEDGER_ABSORBED * bands + k] += absorbed[k];
+		s->ledger[LEDGER_ESCAPED * bands + k] += escaped[k];
+		s->ledger[LEDGER_LOST * bands + k] += lost[k];
+		s->ledger[LEDGER_CUT * bands + k] += cut[k];
+		v->guessed += ((const double *)sent->guessed)[k];
 		if (s->ledger[k] > 0)
 			v->residual = fmax(v->residual,
-			                   fabs(out[k] - gone - sent->kept[k]) / s->ledger[k]);
+			                   fabs(out[k] - gone - kept[k]) / s->ledger[k]);
 	}
+}
+
+static void take_emission(struct solver *v, uint32_t ps, lanes *to, lanes *out)
+{
+	size_t bands = (size_t)v->s->bands;
+	double *from = v->s->unshot_emission + ps * bands;
+
+	memset(to, 0, v->sender.groups * sizeof *to);
+	memcpy(to, from, bands * sizeof *from);
+	memset(from, 0, bands * sizeof *from);
+	for (size_t g = 0; g < v->sender.groups; g++)
+		out[g] += to[g];
 }
 
 static void shoot_side(struct solver *v, uint32_t ps)
 {
-	struct solution *s = v->s;
 	const struct transport *t = v->t;
+	size_t groups = v->sender.groups;
 	struct sent sent = { 0 };
-	double emission[BANDS_MAX], diffuse[BANDS_MAX], out[BANDS_MAX] = { 0 };
-	size_t at = ps * (size_t)s->bands;
+	lanes emission[GROUPS_MAX], diffuse[GROUPS_MAX], out[GROUPS_MAX] = { { 0 } };
 	uint32_t row = t->diffuse_row[ps], lobe = t->emission_row[ps];
 
-	take(s->unshot_emission + at, emission, out, s->bands);
-	take(sender_unshot(&v->sender, ps), diffuse, out, s->bands);
+	take_emission(v, ps, emission, out);
+	take(v->sender.unshot_diffuse + ps * groups, diffuse, out, groups);
 	if (lobe != FF_NO_ROW)
 		shoot_row(v, lobe, FRESH, emission, NULL, &sent);
 	else if (row != FF_NO_ROW)
@@ -199,32 +234,19 @@ static void shoot_side(struct solver *v, uint32_t ps)
 	if (row != FF_NO_ROW)
 		shoot_row(v, row, MIXED, diffuse, NULL, &sent);
 	shoot_links(v, ps, &sent, out);
-	book(v, &sent, out);
-	s->shots++;
+	book(v, &sent, (const double *)out);
+	v->s->shots++;
 }
 
 /* ---- rounds ---- */
 
-static void unshot_by_band(const struct solution *s, double *sum)
-{
-	size_t bands = (size_t)s->bands;
-
-	memset(sum, 0, bands * sizeof *sum);
-	for (size_t i = 0; i < s->patch_sides; i++)
-		for (size_t k = 0; k < bands; k++)
-			sum[k] += s->unshot_emission[i * bands + k] + s->unshot_diffuse[i * bands + k];
-	for (size_t i = 0; i < 2 * s->links; i++)
-		for (size_t k = 0; k < bands; k++)
-			sum[k] += s->unshot_link[i * bands + k];
-}
-
-static void check_ledger(struct solver *v, const double *unshot)
+static void check_ledger(struct solver *v)
 {
 	const struct solution *s = v->s;
 	int bands = s->bands;
 
 	for (int k = 0; k < bands; k++) {
-		double in = s->ledger[k], out = unshot[k];
+		double in = s->ledger[k], out = ((const double *)v->unshot)[k];
 		for (int term = LEDGER_ABSORBED; term < LEDGER_TERMS; term++)
 			out += s->ledger[term * bands + k];
 		if (in > 0)
@@ -232,22 +254,57 @@ static void check_ledger(struct solver *v, const double *unshot)
 	}
 }
 
-/* Largest priority; unshot / emitted of the worst component goes to *worst. */
+/* Unshot flux of a side by band is added to v->unshot, that of its links kept. */
+static void survey_side(struct solver *v, uint32_t ps)
+{
+	const struct sender *s = &v->sender;
+	const double *emission = v->s->unshot_emission + ps * (size_t)s->bands;
+
+	for (int k = 0; k < s->bands; k++)
+		((double *)v->unshot)[k] += emission[k];
+	v->links[ps] = s->link_gain[ps] = 0;
+	for (size_t g = 0; g < s->groups; g++) {
+		lanes x = link_unshot(v, ps, g);
+		v->links[ps] += lanes_total(&x, 1);
+		v->unshot[g] += x + s->unshot_diffuse[ps * s->groups + g];
+	}
+	v->priority[ps] = (plain_unshot(v, ps) + v->links[ps]) * v->weight[ps];
+}
+
+/* Sets v->priority, v->links and v->unshot. Returns the largest priority; unshot /
+ * emitted of the worst component goes to *worst. */
 static double survey(struct solver *v, double *worst)
 {
 	struct components *c = &v->parts;
 	double top = 0;
 
+	memset(v->unshot, 0, sizeof v->unshot);
 	memset(c->sum, 0, c->n * sizeof *c->sum);
 	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++) {
-		double p = priority(v, ps);
-		c->sum[c->of[ps]] += p;
-		top = fmax(top, p);
+		survey_side(v, ps);
+		c->sum[c->of[ps]] += v->priority[ps];
+		top = fmax(top, v->priority[ps]);
 	}
 	*worst = 0;
 	for (uint32_t i = 0; i < c->n; i++)
 		*worst = fmax(*worst, c->sum[i]);
 	return top;
+}
+
+/* Whether a side's turn has come, by its unshot flux now. Flux has only grown since the
+ * survey, and running sums tell all but the close cases: links are many. */
+static int is_due(const struct solver *v, uint32_t ps)
+{
+	const double least = v->s->round[0], close = 1e-9;
+
+	if (v->priority[ps] > 0 && v->priority[ps] >= least)
+		return 1;
+	double about = (plain_unshot(v, ps) + v->links[ps] + v->sender.link_gain[ps]) *
+	               v->weight[ps];
+	if (about < least * (1 - close))
+		return 0;
+	double p = all_unshot(v, ps) * v->weight[ps];
+	return p > 0 && p >= least;
 }
 
 /* Shoots the rest of the current round; 0 when max_shots stopped it. */
@@ -256,8 +313,7 @@ static int finish_round(struct solver *v, uint64_t last_shot)
 	struct solution *s = v->s;
 
 	for (uint32_t ps = (uint32_t)s->round[1]; ps < s->patch_sides; ps++) {
-		double p = priority(v, ps);
-		if (!(p > 0) || p < s->round[0])
+		if (!is_due(v, ps))
 			continue;
 		if (s->shots >= last_shot) {
 			s->round[1] = ps;
@@ -274,26 +330,21 @@ static void rounds(struct solver *v, const struct radiosity_options *o,
 {
 	struct solution *s = v->s;
 	uint64_t last = o->max_shots > UINT64_MAX - s->shots ? UINT64_MAX : s->shots + o->max_shots;
-	double unshot[BANDS_MAX];
+	double top = survey(v, &r->unshot);
+	int whole = 1;
 
-	for (;;) {
-		double top = survey(v, &r->unshot);
-		if (r->unshot <= o->stop && s->round[0] == 0)
-			break;
+	while (whole && (r->unshot > o->stop || s->round[0] != 0)) {
 		if (s->round[0] == 0)
 			s->round[0] = top / 2;
-		int whole = finish_round(v, last);
-		sender_store(&v->sender, s);
-		unshot_by_band(s, unshot);
-		check_ledger(v, unshot);
+		whole = finish_round(v, last);
+		top = survey(v, &r->unshot);
+		check_ledger(v);
 		r->rounds++;
 		if (hooks && hooks->step)
 			hooks->step(hooks->arg, &(struct radiosity_step){ r->rounds, s->shots,
-			            s->bands, unshot, s->ledger, v->residual });
-		if (!whole)
-			break;
+			            s->bands, (const double *)v->unshot, s->ledger, v->residual });
 	}
-	survey(v, &r->unshot);
+	sender_store(&v->sender, s);
 }
 
 static int solver_init(struct solver *v, struct solution *s, const struct transport *t,
@@ -301,7 +352,9 @@ static int solver_init(struct solver *v, struct solution *s, const struct transp
 {
 	*v = (struct solver){ .s = s, .t = t };
 	v->weight = mem_new(s->patch_sides, sizeof *v->weight, "priorities", e);
-	if (!v->weight || sender_init(&v->sender, t, e) || sender_load(&v->sender, s, e) ||
+	v->priority = mem_new(s->patch_sides, sizeof *v->priority, "priorities", e);
+	v->links = mem_new(s->patch_sides, sizeof *v->links, "priorities", e);
+	if (!v->weight || !v->priority || !v->links || sender_init(&v->sender, t, e) || sender_load(&v->sender, s, e) ||
 	    components_init(&v->parts, t, e))
 		return -1;
 	for (uint32_t ps = 0; ps < s->patch_sides; ps++)
@@ -322,7 +375,7 @@ int radiosity_shoot(struct solution *s, const struct transport *t,
                     struct radiosity_report *r, struct err *e)
 {
 	struct solver v;
-	double emitted = 0, unshot[BANDS_MAX];
+	double emitted = 0;
 	int bad = solver_init(&v, s, t, e) || components_need_sink(t, e);
 
 	*r = (struct radiosity_report){ 0 };
@@ -332,13 +385,15 @@ int radiosity_shoot(struct solution *s, const struct transport *t,
 			r->components += v.parts.emitted[i] > 0;
 		for (int k = 0; k < s->bands; k++)
 			emitted += s->ledger[k];
-		unshot_by_band(s, unshot);
 		r->residual = v.residual;
 		r->guessed = v.guessed / emitted;
 		r->solve_bytes = v.sender.bytes;
-		r->bound = total(unshot, (size_t)s->bands) / emitted * radiosity_tail_bound(t, o->threads);
+		r->bound = lanes_total(v.unshot, v.sender.groups) / emitted *
+		           radiosity_tail_bound(t, o->threads, &r->solve_bytes);
 	}
 	free(v.weight);
+	free(v.priority);
+	free(v.links);
 	sender_free(&v.sender);
 	components_free(&v.parts);
 	return bad ? -1 : 0;

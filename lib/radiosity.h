@@ -43,7 +43,7 @@ struct radiosity_report {
 	double bound;          /* certified: sum over elements of area |H - H*| from
 	                          unshot flux, over emitted flux; INFINITY = no finite bound */
 	double guessed;        /* flux that used a link of another source, over emitted */
-	double solve_bytes;    /* of form factors read by shots: runs */
+	double solve_bytes;    /* of form factors read by shots and bound: runs */
 	double gather_bytes;   /* and by the pass over elements: columns and values */
 };
 
@@ -64,7 +64,8 @@ int radiosity_gather(struct solution *s, const struct transport *t, int threads,
                      struct radiosity_report *r, struct err *e);
 
 /* An upper bound, per unit of unshot flux, of the flux that will still arrive
- * anywhere; INFINITY if it cannot be bounded. */
-double radiosity_tail_bound(const struct transport *t, int threads);
+ * anywhere; INFINITY if it cannot be bounded. Adds to *bytes what it reads of runs.
+ * O(runs x steps), at most 64 steps. */
+double radiosity_tail_bound(const struct transport *t, int threads, double *bytes);
 
 #endif

@@ -6,47 +6,42 @@
 #include "bsdf.h"
 #include "mem.h"
 
-/* How the sides of a material split the flux that arrives on them. */
+/* How the sides of materials split the flux that arrives on them. */
 static void fill_parts(struct sender *s)
 {
 	const struct materials *mt = &s->m->material;
+	size_t width = LANES * s->groups;
 
-	for (uint32_t kind = 0; kind < 2 * mt->n; kind++) {
-		uint32_t material = kind >> 1;
-		int side = (int)(kind & 1);
+	for (uint32_t i = 0; i < 2 * mt->n; i++) {
+		uint32_t material = i >> 1;
+		int side = (int)(i & 1);
 		size_t at = material_at(mt, material, side);
-		double *part = (double *)(s->part + kind * PARTS * s->groups);
+		double *part = (double *)(s->part + i * PARTS * s->groups);
 		int lobe_r = bsdf_has_lobe(mt, material, side, 0);
 		int lobe_t = bsdf_has_lobe(mt, material, side, 1);
-		s->is_ideal[kind] = bsdf_has_ideal(mt, material, side, 0) ||
-		                    bsdf_has_ideal(mt, material, side, 1);
 		for (size_t k = 0; k < (size_t)s->bands; k++) {
-			part[PART_RHO * LANES * s->groups + k] = mt->rho_d[at + k];
-			part[PART_TAU * LANES * s->groups + k] = mt->tau_d[at + k];
-			part[PART_LOBES * LANES * s->groups + k] = (lobe_r ? mt->rho_s[at + k] : 0) +
-			                                           (lobe_t ? mt->tau_s[at + k] : 0);
-			part[PART_ABSORBED * LANES * s->groups + k] =
+			part[PART_RHO * width + k] = mt->rho_d[at + k];
+			part[PART_TAU * width + k] = mt->tau_d[at + k];
+			part[PART_LOBES * width + k] = (lobe_r ? mt->rho_s[at + k] : 0) +
+			                               (lobe_t ? mt->tau_s[at + k] : 0);
+			part[PART_ABSORBED * width + k] =
 				1 - bsdf_albedo(mt, material, side, (int)k);
 		}
 	}
 	for (uint32_t ps = 0; ps < 2 * s->m->patches; ps++)
-		s->kind[ps] = 2 * model_patch_material(s->m, ps >> 1) + (ps & 1);
+		s->surface[ps] = 2 * model_patch_material(s->m, ps >> 1) + (ps & 1);
 }
 
 int sender_init(struct sender *s, const struct transport *t, struct err *e)
 {
-	size_t kinds = 2 * t->m->material.n;
-
 	*s = (struct sender){ .t = t, .m = t->m, .bands = t->m->bands };
 	s->groups = lanes_groups(s->bands);
 	s->chain_flux = mem_new(t->chains.n, (size_t)s->bands * sizeof(double), "chain flux", e);
 	s->touched = mem_new(t->chains.n, sizeof *s->touched, "chain flux", e);
 	s->is_touched = mem_new(t->chains.n, 1, "chain flux", e);
-	s->part = lanes_new(kinds * PARTS * s->groups, &s->room[0], "albedos", e);
-	s->is_ideal = mem_new(kinds, 1, "albedos", e);
-	s->kind = mem_new(2 * t->m->patches, sizeof *s->kind, "albedos", e);
-	if (!s->chain_flux || !s->touched || !s->is_touched || !s->part || !s->is_ideal ||
-	    !s->kind)
+	s->part = lanes_new(2 * t->m->material.n * PARTS * s->groups, &s->room[0], "albedos", e);
+	s->surface = mem_new(2 * t->m->patches, sizeof *s->surface, "albedos", e);
+	if (!s->chain_flux || !s->touched || !s->is_touched || !s->part || !s->surface)
 		return -1;
 	fill_parts(s);
 	return 0;
@@ -54,10 +49,10 @@ int sender_init(struct sender *s, const struct transport *t, struct err *e)
 
 void sender_free(struct sender *s)
 {
-	free(s->room[0]);
-	free(s->room[1]);
-	free(s->kind);
-	free(s->is_ideal);
+	for (size_t i = 0; i < sizeof s->room / sizeof *s->room; i++)
+		free(s->room[i]);
+	free(s->link_gain);
+	free(s->surface);
 	free(s->chain_flux);
 	free(s->touched);
 	free(s->is_touched);
@@ -66,22 +61,22 @@ void sender_free(struct sender *s)
 
 int sender_load(struct sender *s, const struct solution *sol, struct err *e)
 {
-	size_t bands = (size_t)s->bands;
+	size_t sides = 2 * s->m->patches, links = 2 * s->t->links;
 
-	s->unshot = lanes_new(2 * s->m->patches * s->groups, &s->room[1], "unshot flux", e);
-	if (!s->unshot)
+	s->unshot_diffuse = lanes_new(sides * s->groups, &s->room[1], "unshot flux", e);
+	s->unshot_link = lanes_new(links * s->groups, &s->room[2], "unshot flux", e);
+	s->link_gain = mem_new(sides, sizeof *s->link_gain, "unshot flux", e);
+	if (!s->unshot_diffuse || !s->unshot_link || !s->link_gain)
 		return -1;
-	for (uint32_t ps = 0; ps < 2 * s->m->patches; ps++)
-		memcpy(sender_unshot(s, ps), sol->unshot_diffuse + ps * bands, bands * sizeof(double));
+	lanes_pack(s->unshot_diffuse, sol->unshot_diffuse, sides, s->bands);
+	lanes_pack(s->unshot_link, sol->unshot_link, links, s->bands);
 	return 0;
 }
 
 void sender_store(const struct sender *s, struct solution *sol)
 {
-	size_t bands = (size_t)s->bands;
-
-	for (uint32_t ps = 0; ps < 2 * s->m->patches; ps++)
-		memcpy(sol->unshot_diffuse + ps * bands, sender_unshot(s, ps), bands * sizeof(double));
+	lanes_unpack(sol->unshot_diffuse, s->unshot_diffuse, 2 * s->m->patches, s->bands);
+	lanes_unpack(sol->unshot_link, s->unshot_link, 2 * s->t->links, s->bands);
 }
 
 static void into_chain(struct sender *s, uint32_t chain, const double *x, const double *part)
@@ -129,123 +124,119 @@ static void take(struct sender *s, uint32_t chain, double *x)
 	}
 }
 
-static void finish(struct sender *s, double *cut)
+static void finish(struct sender *s, lanes *cut)
 {
 	double x[BANDS_MAX];
 
 	for (size_t i = 0; i < s->touches; i++) {
 		take(s, s->touched[i], x);
 		for (int k = 0; cut && k < s->bands; k++)
-			cut[k] += x[k];
+			((double *)cut)[k] += x[k];
 		s->is_touched[s->touched[i]] = 0;
 	}
 	s->touches = 0;
 }
 
-/* Flux x per unit of the values lands on the sides of a block that do no more than
- * absorb and reflect diffusely. */
-struct plain {
+/* Flux landing from a block: four bands of it, x by unit of the values. The loops over
+ * runs are made twice, inlined with `groups` known to be 1 and not. */
+struct landing {
 	const struct sender *s;
-	size_t group;
-	lanes x, kept[2], absorbed[2];
+	const struct block *block;
+	size_t group, groups;
+	int freshness;
+	lanes x;
 };
 
-static inline void land_plain(struct plain *p, uint64_t run, int half)
-{
-	const struct sender *s = p->s;
-	uint32_t target = s->t->run_target[run];
-	const lanes *part = s->part + s->kind[target] * PARTS * s->groups + p->group;
-	lanes x = p->x * s->t->run_sum[run], same = part[PART_RHO * s->groups] * x;
+/* Sums of two kinds by turns, as one addition would wait for the last. */
+struct landed {
+	lanes kept[2], absorbed[2], cut, guessed;
+};
 
-	s->unshot[target * s->groups + p->group] += same;
-	p->kept[half] += same;
-	p->absorbed[half] += part[PART_ABSORBED * s->groups] * x;
+static ALWAYS_INLINE void land_plain(const struct landing l, uint64_t run, lanes *kept,
+                                     lanes *absorbed)
+{
+	uint32_t target = l.s->t->run_target[run];
+	const lanes *part = l.s->part + l.s->surface[target] * PARTS * l.groups + l.group;
+	lanes x = l.x * l.s->t->run_sum[run], same = part[PART_RHO * l.groups] * x;
+
+	l.s->unshot_diffuse[target * l.groups + l.group] += same;
+	*kept += same;
+	*absorbed += part[PART_ABSORBED * l.groups] * x;
 }
 
-/* Two sums at a time: one addition would wait for the last. */
-static void send_plain(struct sender *s, const struct block *block, const double *in,
-                       struct sent *sent)
+static ALWAYS_INLINE void land_special(const struct landing l, uint64_t run, uint32_t link,
+                                       struct landed *sum)
 {
-	int first = 0;
+	uint32_t target = l.s->t->run_target[run];
+	const lanes *part = l.s->part + l.s->surface[target] * PARTS * l.groups + l.group;
+	lanes x = l.x * l.s->t->run_sum[run], same = part[PART_RHO * l.groups] * x;
+	lanes other = part[PART_TAU * l.groups] * x, lobes = part[PART_LOBES * l.groups] * x;
 
-	for (size_t g = 0; g < s->groups; g++, first += LANES) {
-		struct plain p = { .s = s, .group = g };
-		int n = s->bands - first < LANES ? s->bands - first : LANES;
-		uint64_t i = block->run;
-		for (int k = 0; k < n; k++)
-			p.x[k] = in[first + k];
-		for (; i + 1 < block->special; i += 2) {
-			land_plain(&p, i, 0);
-			land_plain(&p, i + 1, 1);
-		}
-		if (i < block->special)
-			land_plain(&p, i, 0);
-		for (int k = 0; k < n; k++) {
-			sent->kept[first + k] += p.kept[0][k] + p.kept[1][k];
-			sent->absorbed[first + k] += p.absorbed[0][k] + p.absorbed[1][k];
-		}
-	}
-	s->bytes += (double)((block->special - block->run) * s->groups) *
-	            (sizeof *s->t->run_target + sizeof *s->t->run_sum);
-}
-
-static void to_link(const struct sender *s, struct solution *sol, uint32_t link, int to,
-                    const double *lobes, struct sent *sent)
-{
-	int guessed = link & RUN_GUESSED ? 1 : 0;
-
+	l.s->unshot_diffuse[target * l.groups + l.group] += same;
+	l.s->unshot_diffuse[(target ^ 1) * l.groups + l.group] += other;
+	sum->kept[0] += same + other;
+	sum->absorbed[0] += part[PART_ABSORBED * l.groups] * x;
 	if (link == FF_NO_ROW) {
-		for (int k = 0; k < s->bands; k++)
-			sent->cut[k] += lobes[k];
+		sum->cut += lobes;
 		return;
 	}
-	double *flux = sol->unshot_link +
-	               (2 * (size_t)(link & ~RUN_GUESSED) + (size_t)to) * (size_t)s->bands;
-	for (int k = 0; k < s->bands; k++) {
-		flux[k] += lobes[k];
-		sent->kept[k] += lobes[k];
-		sent->guessed[k] += guessed ? lobes[k] : 0;
-	}
+	size_t at = 2 * (size_t)(link & ~RUN_GUESSED) + (size_t)l.freshness;
+	l.s->unshot_link[at * l.groups + l.group] += lobes;
+	l.s->link_gain[target] += lanes_total(&lobes, 1);
+	sum->kept[1] += lobes;
+	if (link & RUN_GUESSED)
+		sum->guessed += lobes;
 }
 
-/* Flux x lands on a patch-side of any kind. */
-static void land_special(struct sender *s, struct solution *sol, uint32_t target,
-                         uint32_t link, int to, const double *x, struct sent *sent)
+static ALWAYS_INLINE struct landed land(const struct landing l)
 {
-	size_t width = LANES * s->groups;
-	const double *part = (const double *)(s->part + s->kind[target] * PARTS * s->groups);
-	double *here = sender_unshot(s, target), *there = sender_unshot(s, target ^ 1);
-	double lobes[BANDS_MAX];
+	const uint32_t *link = l.s->t->run_link + l.block->link;
+	uint64_t i = l.block->run, special = l.block->special, end = l.block[1].run;
+	struct landed sum = { 0 };
 
-	for (int k = 0; k < s->bands; k++) {
-		const double *of = part + k;
-		double same = of[PART_RHO * width] * x[k], other = of[PART_TAU * width] * x[k];
-		here[k] += same;
-		there[k] += other;
-		lobes[k] = of[PART_LOBES * width] * x[k];
-		sent->kept[k] += same + other;
-		sent->absorbed[k] += of[PART_ABSORBED * width] * x[k];
+	for (; i + 1 < special; i += 2) {
+		land_plain(l, i, &sum.kept[0], &sum.absorbed[0]);
+		land_plain(l, i + 1, &sum.kept[1], &sum.absorbed[1]);
 	}
-	to_link(s, sol, link, to, lobes, sent);
+	if (i < special)
+		land_plain(l, i, &sum.kept[0], &sum.absorbed[0]);
+	for (i = special; i < end; i++)
+		land_special(l, i, *link++, &sum);
+	return sum;
 }
 
-static void send_special(struct sender *s, struct solution *sol, const struct block *block,
-                         int freshness, const double *in, struct sent *sent)
+static void send_block(struct sender *s, const struct block *block, int freshness,
+                       const lanes *in, struct sent *sent)
 {
 	const struct transport *t = s->t;
-	const uint32_t *link = t->run_link + block->link;
-	double x[BANDS_MAX];
 
-	for (uint64_t i = block->special; i < block[1].run; i++) {
-		uint32_t target = t->run_target[i];
-		for (int k = 0; k < s->bands; k++)
-			x[k] = in[k] * t->run_sum[i];
-		land_special(s, sol, target, *link++, freshness, x, sent);
-		if (s->is_ideal[s->kind[target]])
-			go_on(s, block->chain, s->kind[target] >> 1, (int)(target & 1), x);
+	for (size_t g = 0; g < s->groups; g++) {
+		struct landed sum = s->groups == 1
+			? land((struct landing){ s, block, 0, 1, freshness, in[0] })
+			: land((struct landing){ s, block, g, s->groups, freshness, in[g] });
+		sent->kept[g] += sum.kept[0] + sum.kept[1];
+		sent->absorbed[g] += sum.absorbed[0] + sum.absorbed[1];
+		sent->cut[g] += sum.cut;
+		sent->guessed[g] += sum.guessed;
 	}
-	s->bytes += (double)(block[1].run - block->special) *
-	            (2 * sizeof *t->run_target + sizeof *t->run_sum);
+	s->bytes += (double)s->groups *
+	            ((double)(block[1].run - block->run) *
+	                 (sizeof *t->run_target + sizeof *t->run_sum) +
+	             (double)(block[1].run - block->special) * sizeof *t->run_link);
+}
+
+/* What goes on from a block's ideal runs when x is its flux by unit of the values. */
+static void send_on(struct sender *s, const struct block *block, const double *x)
+{
+	const struct transport *t = s->t;
+	double landed[BANDS_MAX];
+
+	for (uint64_t i = block->ideal; i < block[1].run; i++) {
+		uint32_t surface = s->surface[t->run_target[i]];
+		for (int k = 0; k < s->bands; k++)
+			landed[k] = x[k] * t->run_sum[i];
+		go_on(s, block->chain, surface >> 1, (int)(surface & 1), landed);
+	}
 }
 
 /* How much of the flux in a block comes back to it, per band, through events whose
@@ -263,9 +254,8 @@ static void loop_gain(const struct sender *s, const struct block *block, double 
 		double landed = 0;
 		if (child[event] != block->chain)
 			continue;
-		/* What reflects or transmits ideally is special. */
-		for (uint64_t i = block->special; i < block[1].run; i++)
-			if (s->kind[s->t->run_target[i]] == id / 2)
+		for (uint64_t i = block->ideal; i < block[1].run; i++)
+			if (s->surface[s->t->run_target[i]] == id / 2)
 				landed += s->t->run_sum[i];
 		for (int k = 0; k < s->bands; k++)
 			gain[k] += (id & 1 ? mt->tau_s : mt->rho_s)[at + (size_t)k] * landed / block->sum;
@@ -274,7 +264,7 @@ static void loop_gain(const struct sender *s, const struct block *block, double 
 
 /* All flux that lands from a block when `in` comes into it: once, and again each
  * time round. What could go round for ever is left in `cut`, if that is asked for. */
-static void go_round(struct sender *s, const struct block *block, double *in, double *cut)
+static void go_round(struct sender *s, const struct block *block, double *in, lanes *cut)
 {
 	double gain[BANDS_MAX];
 
@@ -286,39 +276,40 @@ static void go_round(struct sender *s, const struct block *block, double *in, do
 			in[k] /= 1 - gain[k];
 		} else {
 			if (cut)
-				cut[k] += in[k];
+				((double *)cut)[k] += in[k];
 			in[k] = 0;
 		}
 	}
 }
 
-void send_row(struct sender *s, struct solution *sol, uint32_t row, int freshness,
-              const double *flux, struct sent *sent)
+void send_row(struct sender *s, uint32_t row, int freshness, const lanes *flux,
+              struct sent *sent)
 {
 	const struct transport *t = s->t;
-	int bands = s->bands;
 
 	for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
 		const struct block *block = &t->block[b];
-		double in[BANDS_MAX], any = 0;
+		lanes in[GROUPS_MAX];
+		double any = 0;
+		memset(in, 0, s->groups * sizeof *in);
 		if (block->chain)
-			take(s, block->chain, in);
-		for (int k = 0; k < bands; k++) {
-			in[k] = block->chain ? in[k] : flux[k];
-			any += in[k];
-		}
+			take(s, block->chain, (double *)in);
+		else
+			memcpy(in, flux, s->groups * sizeof *in);
+		for (size_t g = 0; g < s->groups; g++)
+			any += in[g][0] + in[g][1] + in[g][2] + in[g][3];
 		if (!(any > 0))
 			continue;
-		go_round(s, block, in, sent->cut);
-		for (int k = 0; k < bands; k++) {
-			in[k] /= block->sum > 0 ? block->sum : 1;
-			sent->escaped[k] += in[k] * block->escape;
-			sent->absorbed[k] += in[k] * block->black;
-			sent->lost[k] += in[k] * block->lost;
-			sent->cut[k] += in[k] * block->cut;
+		go_round(s, block, (double *)in, sent->cut);
+		for (size_t g = 0; g < s->groups; g++) {
+			in[g] /= block->sum > 0 ? block->sum : 1;
+			sent->escaped[g] += in[g] * block->escape;
+			sent->absorbed[g] += in[g] * block->black;
+			sent->lost[g] += in[g] * block->lost;
+			sent->cut[g] += in[g] * block->cut;
 		}
-		send_plain(s, block, in, sent);
-		send_special(s, sol, block, freshness, in, sent);
+		send_block(s, block, freshness, in, sent);
+		send_on(s, block, (double *)in);
 	}
 	finish(s, sent->cut);
 }
@@ -326,25 +317,19 @@ void send_row(struct sender *s, struct solution *sol, uint32_t row, int freshnes
 void send_block_flux(struct sender *s, uint32_t row, const double *flux, double *block_flux)
 {
 	const struct transport *t = s->t;
-	int bands = s->bands;
+	double x[BANDS_MAX];
 
 	for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
 		const struct block *block = &t->block[b];
-		double *in = block_flux + (b - t->row_block[row]) * (size_t)bands;
-		double x[BANDS_MAX];
+		double *in = block_flux + (b - t->row_block[row]) * (size_t)s->bands;
 		if (block->chain)
 			take(s, block->chain, in);
 		else
-			memcpy(in, flux, (size_t)bands * sizeof *in);
+			memcpy(in, flux, (size_t)s->bands * sizeof *in);
 		go_round(s, block, in, NULL);
-		for (uint64_t i = block->special; t->chains.events && i < block[1].run; i++) {
-			uint32_t kind = s->kind[t->run_target[i]];
-			if (!s->is_ideal[kind])
-				continue;
-			for (int k = 0; k < bands; k++)
-				x[k] = block->sum > 0 ? in[k] / block->sum * t->run_sum[i] : 0;
-			go_on(s, block->chain, kind >> 1, (int)(kind & 1), x);
-		}
+		for (int k = 0; k < s->bands; k++)
+			x[k] = block->sum > 0 ? in[k] / block->sum : 0;
+		send_on(s, block, x);
 	}
 	finish(s, NULL);
 }

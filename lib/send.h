@@ -15,11 +15,13 @@ struct sender {
 	const struct model *m;
 	int bands;
 	size_t groups;           /* vectors for the bands */
-	uint32_t *kind;          /* [2P] material and side, an index of part and is_ideal */
-	lanes *part;             /* [kinds][PARTS][groups] of flux arriving */
-	uint8_t *is_ideal;       /* [kinds] some goes on by R or T */
-	lanes *unshot;           /* [2P][groups] flux to leave diffusely, sender_load */
-	void *room[2];           /* memory of part and unshot */
+	uint32_t *surface;       /* [2P] material and side, an index of part */
+	lanes *part;             /* [2 materials][PARTS][groups] of flux arriving */
+	lanes *unshot_diffuse;   /* [2P][groups] as in solution.h, see sender_load */
+	lanes *unshot_link;      /* [links][2][groups] */
+	double *link_gain;       /* [2P] flux that came to the links of a side, to rounding,
+	                            since the owner set it to 0 */
+	void *room[3];           /* memory of these */
 	double *chain_flux;      /* [chains][bands], 0 between rows */
 	uint32_t *touched;       /* chains with flux */
 	uint8_t *is_touched;
@@ -31,30 +33,26 @@ struct sender {
  * lobes, absorbed. */
 enum { PART_RHO, PART_TAU, PART_LOBES, PART_ABSORBED, PARTS };
 
-/* What became of a row's flux, per band. */
+enum { GROUPS_MAX = BANDS_MAX / LANES };
+
+/* What became of a row's flux, by group of bands. */
 struct sent {
-	double absorbed[BANDS_MAX], escaped[BANDS_MAX], lost[BANDS_MAX], cut[BANDS_MAX];
-	double kept[BANDS_MAX];  /* became unshot flux again */
-	double guessed[BANDS_MAX];
+	lanes absorbed[GROUPS_MAX], escaped[GROUPS_MAX], lost[GROUPS_MAX], cut[GROUPS_MAX];
+	lanes kept[GROUPS_MAX];  /* became unshot flux again */
+	lanes guessed[GROUPS_MAX];
 };
 
 int sender_init(struct sender *s, const struct transport *t, struct err *e);
 void sender_free(struct sender *s);
 
-/* The unshot diffuse flux of a solution into s->unshot, which send_row adds to, and
- * back. 0, or -1 and e. */
+/* The unshot flux of a solution into the sender, whose own send_row adds to, and back.
+ * 0, or -1 and e. */
 int sender_load(struct sender *s, const struct solution *sol, struct err *e);
 void sender_store(const struct sender *s, struct solution *sol);
 
-/* Unshot diffuse flux of a patch-side, [bands]. */
-static inline double *sender_unshot(const struct sender *s, uint32_t ps)
-{
-	return (double *)(s->unshot + ps * s->groups);
-}
-
-/* Sends flux[bands] by a row into s->unshot and sol's unshot_link; adds to `sent`. */
-void send_row(struct sender *s, struct solution *sol, uint32_t row, int freshness,
-              const double *flux, struct sent *sent);
+/* Sends flux by a row into the sender's unshot flux; adds to `sent`. */
+void send_row(struct sender *s, uint32_t row, int freshness, const lanes *flux,
+              struct sent *sent);
 
 /* The flux that comes in by each block of a row, [blocks of the row][bands], when
  * the row sends flux[bands]. */

@@ -25,6 +25,7 @@ struct tail {
 	double *row;          /* [rows][bands] */
 	lanes *q;             /* [2P][groups] */
 	double arrivals;      /* largest of a row */
+	double bytes;         /* of runs read */
 };
 
 static void unit_rows(struct tail *x, struct sender *sender)
@@ -129,12 +130,14 @@ static double series(struct tail *x, int threads)
 	for (int k = 1; k < STEPS && top > .5; k++) {
 		sum += top;
 		par_for(x->t->rows, 64, threads, rows_step, x, NULL);
+		x->bytes += (double)(x->t->runs * x->groups) *
+		            (sizeof *x->t->run_target + sizeof *x->t->run_sum);
 		top = sides_step(x, 0);
 	}
 	return top < 1 ? sum / (1 - top) * x->arrivals : INFINITY;
 }
 
-double radiosity_tail_bound(const struct transport *t, int threads)
+double radiosity_tail_bound(const struct transport *t, int threads, double *bytes)
 {
 	struct err e = { 0 };
 	struct sender sender;
@@ -150,6 +153,7 @@ double radiosity_tail_bound(const struct transport *t, int threads)
 	if (sender_init(&sender, t, &e) == 0 && x.in && x.row && x.q) {
 		unit_rows(&x, &sender);
 		bound = series(&x, threads);
+		*bytes += x.bytes;
 	}
 	sender_free(&sender);
 	free(x.in);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "bsdf.h"
+#include "lanes.h"
 #include "par.h"
 
 static const char what[] = "form factors by patch";
@@ -236,10 +237,12 @@ static uint32_t find_link(const struct transport *t, const struct link_key *l,
 struct pass {
 	struct transport *t;
 	const struct link_key *link;
-	uint8_t *is_special;                   /* [2P] */
+	uint8_t *kind;                         /* [2P] enum side_kind */
+	uint32_t *target;                      /* [threads][2P] scratch: a block's runs */
+	double *sum;                           /* [threads][2P] */
 };
 
-static void mark_special(const struct transport *t, uint8_t *is_special)
+static void set_kinds(const struct transport *t, uint8_t *kind)
 {
 	const struct materials *mt = &t->m->material;
 
@@ -247,93 +250,85 @@ static void mark_special(const struct transport *t, uint8_t *is_special)
 		uint32_t material = model_patch_material(t->m, ps >> 1);
 		int side = (int)(ps & 1);
 		size_t at = material_at(mt, material, side);
+		int special = t->target_link[ps + 1] > t->target_link[ps], ideal = 0;
 		for (int k = 0; k < t->m->bands; k++)
-			is_special[ps] |= mt->tau_d[at + (size_t)k] > 0;
-		for (int way = 0; way < 2; way++)
-			is_special[ps] |= bsdf_has_lobe(mt, material, side, way) ||
-			                  bsdf_has_ideal(mt, material, side, way);
-		is_special[ps] |= t->target_link[ps + 1] > t->target_link[ps];
+			special |= mt->tau_d[at + (size_t)k] > 0;
+		for (int way = 0; way < 2; way++) {
+			special |= bsdf_has_lobe(mt, material, side, way);
+			ideal |= bsdf_has_ideal(mt, material, side, way);
+		}
+		kind[ps] = ideal ? SIDE_IDEAL : special ? SIDE_SPECIAL : SIDE_PLAIN;
 	}
 }
 
-/* The entries of a block, patch-side by patch-side. */
-struct landing {
-	const struct model *m;
-	const struct ff *f;
-	struct ff_cursor cursor;
-	struct ff_span rest;                   /* of a span that reaches beyond the side */
+static inline uint32_t target_of(const struct transport *t, const struct ff *f, uint32_t column)
+{
+	return f->to_patches ? column : 2 * t->m->element_patch[column >> 1] + (column & 1);
+}
+
+/* Entries come patch-side by patch-side. */
+struct runs {
+	uint32_t *target;
+	double *sum;
+	size_t n;
+	uint32_t last;
+	double so_far;
 };
 
-/* The next entries on one patch-side of a span, 0 at the end. */
-static int next_piece(struct landing *l, struct ff_span *piece, uint32_t *target)
+/* No branch depends on where a run ends, which cannot be foreseen. Inlined with
+ * constant `sums`: whether they are wanted. */
+static ALWAYS_INLINE void add_entry(struct runs *r, uint32_t target, double value, int sums)
 {
-	if (l->rest.count == 0 && !ff_next(&l->cursor, &l->rest))
-		return 0;
-	uint32_t receiver = l->rest.column >> 1, n = 1;
-	*piece = l->rest;
-	if (l->f->to_patches) {
-		*target = l->rest.column;
-	} else {
-		uint32_t patch = l->m->element_patch[receiver];
-		n = l->m->patch_start[patch + 1] - receiver;
-		*target = 2 * patch + (l->rest.column & 1);
+	int is_new = target != r->last;
+
+	r->n += (size_t)is_new;
+	r->last = target;
+	r->target[r->n - 1] = target;
+	if (sums) {
+		r->so_far = r->so_far * (1 - is_new) + value;
+		r->sum[r->n - 1] = r->so_far;
 	}
-	piece->count = n < l->rest.count ? n : l->rest.count;
-	l->rest.column += 2 * piece->count;
-	l->rest.entry += piece->count;
-	l->rest.count -= piece->count;
-	return 1;
 }
 
-static struct landing land(const struct transport *t, const struct block *block)
+static ALWAYS_INLINE void add_list(const struct transport *t, const struct ff *f, uint64_t b,
+                                   struct runs *to, int sums)
 {
+	const uint32_t *column = f->column + ff_block_column(f)[b];
+	uint64_t first = f->block_start[b], n = f->block_start[b + 1] - first;
+	struct runs r = *to;
+
+	for (uint64_t i = 0; i < n; i++)
+		add_entry(&r, target_of(t, f, column[i]), sums ? ff_value(f, first + i) : 0, sums);
+	*to = r;
+}
+
+static ALWAYS_INLINE void add_spans(const struct transport *t, const struct ff *f, uint64_t b,
+                                    struct runs *to, int sums)
+{
+	struct ff_span s;
+	struct runs r = *to;
+
+	for (struct ff_cursor c = ff_begin(f, b); ff_next(&c, &s);)
+		for (uint32_t k = 0; k < s.count; k++)
+			add_entry(&r, target_of(t, f, s.column + 2 * k),
+			          sums ? ff_value(f, s.entry + k) : 0, sums);
+	*to = r;
+}
+
+/* A block's entries summed by patch-side into scratch. */
+static ALWAYS_INLINE struct runs sum_block(const struct pass *p, const struct block *block,
+                                           int thread, int sums)
+{
+	const struct transport *t = p->t;
 	const struct ff *f = t->shard[block->shard];
+	size_t at = (size_t)thread * 2 * t->m->patches;
+	struct runs r = { p->target + at, p->sum + at, 0, UINT32_MAX, 0 };
 
-	return (struct landing){ .m = t->m, .f = f, .cursor = ff_begin(f, block->local) };
-}
-
-static void count_runs(const struct pass *p, struct block *block)
-{
-	struct landing l = land(p->t, block);
-	struct ff_span piece;
-	uint32_t target, last = UINT32_MAX;
-
-	while (next_piece(&l, &piece, &target)) {
-		block->run += target != last;
-		block->link += target != last && p->is_special[target];
-		last = target;
-	}
-}
-
-static double sum_values(const struct ff *f, const struct ff_span *s, double sum)
-{
-	for (uint32_t k = 0; k < s->count; k++)
-		sum += ff_value(f, s->entry + k);
-	return sum;
-}
-
-static void fill_runs(const struct pass *p, struct block *block, uint32_t source)
-{
-	struct transport *t = p->t;
-	struct landing l = land(t, block);
-	struct ff_span piece;
-	uint64_t plain = block->run, special = block->special, at = plain;
-	uint32_t target, last = UINT32_MAX;
-
-	while (next_piece(&l, &piece, &target)) {
-		if (target != last) {
-			at = p->is_special[target] ? special++ : plain++;
-			t->run_target[at] = target;
-			if (p->is_special[target])
-				t->run_link[block->link + (at - block->special)] =
-					find_link(t, p->link, block, target, source);
-		}
-		last = target;
-		t->run_sum[at] = sum_values(l.f, &piece, t->run_sum[at]);
-	}
-	for (uint64_t i = block->run; i < block[1].run; i++)
-		block->sum += t->run_sum[i];
-	block->sum += block->escape + block->black + block->lost + block->cut;
+	if (ff_has_spans(f, block->local))
+		add_spans(t, f, block->local, &r, sums);
+	else
+		add_list(t, f, block->local, &r, sums);
+	return r;
 }
 
 static void count_rows(void *arg, size_t begin, size_t end, int thread)
@@ -341,9 +336,49 @@ static void count_rows(void *arg, size_t begin, size_t end, int thread)
 	const struct pass *p = arg;
 	struct transport *t = p->t;
 
-	(void)thread;
-	for (uint64_t b = t->row_block[begin]; b < t->row_block[end]; b++)
-		count_runs(p, &t->block[b]);
+	for (uint64_t b = t->row_block[begin]; b < t->row_block[end]; b++) {
+		struct runs r = sum_block(p, &t->block[b], thread, 0);
+		uint64_t n[SIDE_KINDS] = { 0 };
+		for (size_t i = 0; i < r.n; i++)
+			n[p->kind[r.target[i]]]++;
+		t->block[b].run = r.n;
+		t->block[b].special = n[SIDE_SPECIAL];
+		t->block[b].ideal = n[SIDE_IDEAL];
+	}
+}
+
+/* Counts become firsts. */
+static void number_runs(struct transport *t)
+{
+	for (size_t b = 0; b <= t->blocks; b++) {
+		struct block *block = &t->block[b];
+		uint64_t n = block->run, special = block->special, ideal = block->ideal;
+		block->run = t->runs;
+		block->link = t->special_runs;
+		t->runs += n;
+		t->special_runs += special + ideal;
+		block->special = t->runs - special - ideal;
+		block->ideal = t->runs - ideal;
+	}
+}
+
+static void fill_block(const struct pass *p, struct block *block, uint32_t source, int thread)
+{
+	struct transport *t = p->t;
+	struct runs r = sum_block(p, block, thread, 1);
+	uint64_t to[SIDE_KINDS] = { block->run, block->special, block->ideal };
+
+	block->sum = block->escape + block->black + block->lost + block->cut;
+	for (size_t i = 0; i < r.n; i++) {
+		uint8_t kind = p->kind[r.target[i]];
+		uint64_t at = to[kind]++;
+		t->run_target[at] = r.target[i];
+		t->run_sum[at] = r.sum[i];
+		block->sum += r.sum[i];
+		if (kind != SIDE_PLAIN)
+			t->run_link[block->link + (at - block->special)] =
+				find_link(t, p->link, block, r.target[i], source);
+	}
 }
 
 static void fill_rows(void *arg, size_t begin, size_t end, int thread)
@@ -351,33 +386,21 @@ static void fill_rows(void *arg, size_t begin, size_t end, int thread)
 	const struct pass *p = arg;
 	struct transport *t = p->t;
 
-	(void)thread;
 	for (size_t r = begin; r < end; r++)
 		for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
-			fill_runs(p, &t->block[b], t->row_side[r]);
-}
-
-/* Counts in run and link become firsts. */
-static void number_runs(struct transport *t)
-{
-	for (size_t b = 0; b <= t->blocks; b++) {
-		struct block *block = &t->block[b];
-		uint64_t n = block->run, special = block->link;
-		block->run = t->runs;
-		block->link = t->special_runs;
-		block->special = t->runs + n - special;
-		t->runs += n;
-		t->special_runs += special;
-	}
+			fill_block(p, &t->block[b], t->row_side[r], thread);
 }
 
 static int make_runs(struct transport *t, const struct link_key *link, int threads,
                      struct err *e)
 {
-	struct pass p = { t, link, mem_new(2 * t->m->patches, 1, what, e) };
+	size_t sides = 2 * t->m->patches, scratch = sides * (size_t)(threads > 1 ? threads : 1);
+	struct pass p = { t, link, mem_new(sides, 1, what, e),
+	                  mem_new(scratch, sizeof *p.target, what, e),
+	                  mem_new(scratch, sizeof *p.sum, what, e) };
 
-	if (p.is_special) {
-		mark_special(t, p.is_special);
+	if (p.kind && p.target && p.sum) {
+		set_kinds(t, p.kind);
 		par_for(t->rows, 64, threads, count_rows, &p, NULL);
 		number_runs(t);
 		t->run_target = mem_new(t->runs, sizeof *t->run_target, what, e);
@@ -387,7 +410,9 @@ static int make_runs(struct transport *t, const struct link_key *link, int threa
 	int bad = !t->run_target || !t->run_sum || !t->run_link;
 	if (!bad)
 		par_for(t->rows, 64, threads, fill_rows, &p, NULL);
-	free(p.is_special);
+	free(p.kind);
+	free(p.target);
+	free(p.sum);
 	return bad ? -1 : 0;
 }
 

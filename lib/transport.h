@@ -7,16 +7,24 @@
 #include "ff.h"
 #include "model.h"
 
+/* How a patch-side takes part in shooting. */
+enum side_kind {
+	SIDE_PLAIN,          /* absorbs and reflects diffusely, no more */
+	SIDE_SPECIAL,        /* lets light through diffusely or has a finite lobe */
+	SIDE_IDEAL,          /* sends light on by an ideal event, too */
+	SIDE_KINDS
+};
+
 /* What comes in by one chain, and where it lands: runs, one for each patch-side, in
- * two stretches by kind of side, ascending in each. Sides that do no more than absorb
- * and reflect diffusely come first; the runs of the others, which send light through,
- * by a lobe or by an ideal event, have a link beside. */
+ * stretches by kind of side, ascending in each. Those that are not plain have a link
+ * beside. */
 struct block {
 	uint32_t chain, shard;
 	uint64_t local;      /* its number in the shard */
 	uint64_t run;        /* first; ends where the next block's begins */
-	uint64_t special;    /* first run of the second stretch */
-	uint64_t link;       /* run_link of that run */
+	uint64_t special;    /* first run on a special side */
+	uint64_t ideal;      /* first run on an ideal one */
+	uint64_t link;       /* run_link of the first special run */
 	double sum;          /* runs + the rest below: what comes in by this chain */
 	double escape, black, lost, cut;
 };

@@ -2,8 +2,8 @@
 """check_formats.py MAN FILE...: do the section-5 pages in directory MAN and the
 cache files agree? Every array of a file must be in its pages with this dtype and
 shape (sizes like P+1 or 2E must mean the same throughout a file) and every array
-in the pages must be in the file; likewise the metadata. The program in mesh.5's
-EXAMPLES must be tests/read_cache.py."""
+in the pages must be in the file; likewise the metadata. The programs in the EXAMPLES of
+mesh.5 and ff.5 must be tests/read_cache.py and tests/read_row.py."""
 
 import json
 import os
@@ -78,17 +78,18 @@ def check(man, path):
     return [f"{path}: {w}" for w in wrong]
 
 
-def check_example(man):
-    page = open(os.path.join(man, "mesh.5"), encoding="utf-8").read()
+def check_example(man, name, program):
+    page = open(os.path.join(man, name), encoding="utf-8").read()
     example = re.search(r"^\.Sh EXAMPLES\n.*?^\.Bd -literal\n(.*?)^\.Ed$", page, re.M | re.S)
-    reader = open(os.path.join(os.path.dirname(__file__), "read_cache.py")).read()
-    return [] if example and example[1] == reader else ["mesh.5: EXAMPLES is not read_cache.py"]
+    reader = open(os.path.join(os.path.dirname(__file__), program)).read()
+    return [] if example and example[1] == reader else [f"{name}: EXAMPLES is not {program}"]
 
 
 def main():
     if len(sys.argv) < 2:
         sys.exit(__doc__)
-    wrong = check_example(sys.argv[1])
+    wrong = check_example(sys.argv[1], "mesh.5", "read_cache.py")
+    wrong += check_example(sys.argv[1], "ff.5", "read_row.py")
     for path in sys.argv[2:]:
         wrong += check(sys.argv[1], path)
     print("\n".join(wrong) if wrong else "pages and files agree")

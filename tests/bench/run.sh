@@ -1,7 +1,8 @@
 #!/bin/sh
 # make bench: what the chain reaches of what the machine can do, as ratios measured
 # side by side: ffcalc's and trace's rays against a bare Embree loop over rays made
-# the same way, shoot's pass over form factors against plain reading of memory.
+# the same way, shoot's reading of form factors (its shots and its pass over elements) against
+# plain reading of memory.
 # Medians of three pairs. usage: BUILD=DIR tests/bench/run.sh
 set -eu
 top=$(cd "$(dirname "$0")/../.." && pwd)

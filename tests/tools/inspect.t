@@ -54,6 +54,15 @@ check "--row: the row of a .ff sums to 1 by its first chain" sh -c "inspect --ro
 import sys
 lines = [l.split(\",\") for l in sys.stdin if l.startswith(\"0,\")]
 assert abs(sum(float(l[-1]) for l in lines) - 1) < 1e-12'"
+check "--row: what the reader of ff(5) prints" sh -c "
+inspect --row 0 '$T/a.ff' | grep '^[0-9]*,.*,.*,' | grep -v ',,' |
+	sed 's/,.*:\([fb]\),\([0-9]*\),/ \2 \1 /' > '$T/said' &&
+$PYTHON '$top/tests/read_row.py' '$T/a.ff' 0 > '$T/read' && [ -s '$T/read' ] && $PYTHON -c '
+import sys
+a, b = ([l.split() for l in open(p)] for p in sys.argv[1:])
+assert len(a) == len(b)
+for x, y in zip(a, b):
+    assert x[:3] == y[:3] and float(x[3]) == float(y[3])' '$T/said' '$T/read'"
 check "--row: an element-side" sh -c "inspect --row 0 '$T/a.rad' > '$T/row' &&
 	inspect --csv '$T/a.rad' | head -n 2 | cmp - '$T/row'"
 

@@ -98,22 +98,23 @@ static inline void small_model(struct model *m)
 }
 
 /* Chains 0 and 1 (through material 0, front, by T). Rows: diffuse of patch-sides
- * 0, 1, 2 and one reflected lobe of patch-side 0; the first has a second block. */
+ * 0, 1, 2 and one reflected lobe of patch-side 0; the first has a second block.
+ * The block of patch-side 2 is shorter as a span. */
 static inline void small_ff(struct ff *f)
 {
 	const uint64_t chain_start[] = { 0, 0, 1 }, row_block[] = { 0, 2, 3, 4, 5 };
-	const uint64_t block_start[] = { 0, 2, 3, 3, 5, 6 }, block_arrival[] = { 0, 1, 1, 1, 1, 1 };
+	const uint64_t block_start[] = { 0, 2, 3, 3, 6, 7 }, block_arrival[] = { 0, 1, 1, 1, 1, 1 };
 	const uint32_t chain_event[] = { 1 }, chain_count[] = { 1 }, row_side[] = { 0, 1, 2, 0 };
 	const uint32_t samples[] = { 64, 64, 64, 16 }, block_chain[] = { 0, 1, 0, 0, 0 };
-	const uint32_t column[] = { 1, 4, 4, 0, 2, 4 };
+	const uint32_t column[] = { 1, 4, 4, 0, 2, 4, 4 };
 	const uint8_t kind[] = { FF_DIFFUSE, FF_DIFFUSE, FF_DIFFUSE, FF_REFLECTED };
-	const float value[] = { .25f, .25f, .125f, .125f, .25f, .5f }, up[] = { 0, 0, 1 };
+	const float value[] = { .25f, .25f, .125f, .125f, .125f, .125f, .5f }, up[] = { 0, 0, 1 };
 	const double scale[] = { 1, 1, 1, 2 }, none[] = { 0, 0, 0, 0, 0 };
 	const double error[] = { .01, 0, .02, 0 }, residual[] = { 1e-7, 0, 0, 0 };
 	const double escape[] = { .375, 0, 1, .5, 0 }, black[] = { .125, .125, 0, .125, 0 };
 	const uint32_t target[] = { 0 }, source[] = { 2 }, chain[] = { 0 }, rows[] = { 3, FF_NO_ROW };
 
-	*f = (struct ff){ .chains = 2, .chain_events = 1, .rows = 4, .blocks = 5, .entries = 6,
+	*f = (struct ff){ .chains = 2, .chain_events = 1, .rows = 4, .blocks = 5, .entries = 7,
 		.arrivals = 1, .links = 1, .patch_end = 2, .part = 1, .parts = 1,
 		.chain_start = COPY(chain_start), .chain_event = COPY(chain_event),
 		.chain_count = COPY(chain_count), .row_side = COPY(row_side),

@@ -73,16 +73,16 @@ static void write_rad(void)
 }
 
 /* In two batches: rows of patch 0, then the row of patch 1. */
-static int try_write_ff(const struct ff *f, struct err *e)
+static int try_write_ff(const struct ff *f, int to_patches, struct err *e)
 {
-	const uint64_t blocks[] = { 0, 1 }, entries[] = { 0, 2 }, arrivals[] = { 0, 0 };
-	struct ff_writer *w = ff_file_create(ff_path, &model, 0, 0, e);
+	const uint64_t blocks[] = { 0, 1 }, entries[] = { 0, 3 }, arrivals[] = { 0, 0 };
+	struct ff_writer *w = ff_file_create(ff_path, &model, 0, to_patches, e);
 
 	if (!w)
 		return -1;
 	struct ff first = *f, second = *f;
 	first.rows = 2, first.blocks = 3, first.entries = 3, first.links = 0;
-	second.rows = 1, second.blocks = 1, second.entries = 2;
+	second.rows = 1, second.blocks = 1, second.entries = 3;
 	second.arrivals = second.links = 0;
 	second.row_side += 2, second.row_kind += 2, second.row_samples += 2;
 	second.row_scale += 2, second.row_residual += 2, second.row_error += 2;
@@ -108,7 +108,7 @@ static int try_write_ff(const struct ff *f, struct err *e)
 	third.block_lost += 4, third.block_cut += 4;
 	third.block_start = (uint64_t *)last_entries;
 	third.block_arrival = (uint64_t *)arrivals;
-	third.column += 5, third.value += 5;
+	third.column += 6, third.value += 6;
 	third.link_row = (uint32_t *)link_row;
 	if (ff_file_append(w, &third, e)) {
 		ff_file_abandon(w);
@@ -121,7 +121,7 @@ static void write_ff(void)
 {
 	struct err e = { 0 };
 
-	must(try_write_ff(&ff, &e), &e);
+	must(try_write_ff(&ff, 0, &e), &e);
 }
 
 /* ---- round trips ---- */
@@ -203,8 +203,13 @@ static void test_ff(void **state)
 	assert_int_equal(f.f.rows, ff.rows);
 	SAME(f.f.row_block, ff.row_block, 5);
 	SAME(f.f.block_start, ff.block_start, 6);
-	SAME(f.f.column, ff.column, 6);
-	SAME(f.f.value, ff.value, 6);
+	const uint64_t words[] = { 0, 2, 3, 3, 5, 6 };
+	const uint32_t column[] = { 1, 4, 4, 0, 3, 4 }; /* the fourth block is a span */
+	SAME(f.f.block_column, words, 6);
+	SAME(f.f.column, column, 6);
+	assert_true(f.f.columns == 6 && !f.f.to_patches);
+	assert_true(ff_has_spans(&f.f, 3) && !ff_has_spans(&f.f, 0));
+	SAME(f.f.value, ff.value, 7);
 	assert_null(f.f.value64);
 	SAME(f.f.block_escape, ff.block_escape, 5);
 	SAME(f.f.link_row, ff.link_row, 2);
@@ -215,6 +220,58 @@ static void test_ff(void **state)
 	assert_int_equal(f.scene.patch_sides[0], 3);
 	assert_int_equal(f.scene.patch_sides[1], 1);
 	SAME(f.scene.patch_area, model.patch_area, 2);
+	ff_file_close(&f);
+}
+
+/* What a block holds, whatever its words are. */
+static void expect_block(const struct ff *f, uint64_t block, const uint32_t *column,
+                         const float *value, uint32_t n)
+{
+	struct ff_span s;
+	uint32_t i = 0;
+
+	for (struct ff_cursor c = ff_begin(f, block); ff_next(&c, &s);)
+		for (uint32_t k = 0; k < s.count; k++, i++) {
+			assert_true(i < n);
+			assert_int_equal(s.column + 2 * k, column[i]);
+			assert_true(ff_value(f, s.entry + k) == (double)value[i]);
+		}
+	assert_int_equal(i, n);
+}
+
+static void test_lists_and_spans(void **state)
+{
+	struct ff_file f;
+	struct err e = { 0 };
+
+	(void)state;
+	write_ff();
+	must(ff_file_open(ff_path, &model, NULL, &f, &e), &e);
+	for (uint64_t b = 0; b < ff.blocks; b++) {
+		const uint64_t *start = ff.block_start + b;
+		expect_block(&ff, b, ff.column + start[0], ff.value + start[0],
+		             (uint32_t)(start[1] - start[0]));
+		expect_block(&f.f, b, ff.column + start[0], ff.value + start[0],
+		             (uint32_t)(start[1] - start[0]));
+	}
+	ff_file_close(&f);
+}
+
+/* Elements 0 and 1 are patch 0, element 2 is patch 1. */
+static void test_ff_to_patches(void **state)
+{
+	const uint32_t one[] = { 1, 2 }, sum[] = { 0, 2 };
+	const float same[] = { .25f, .25f }, summed[] = { .25f, .125f };
+	struct ff_file f;
+	struct err e = { 0 };
+
+	(void)state;
+	must(try_write_ff(&ff, 1, &e), &e);
+	must(ff_file_open(ff_path, &model, NULL, &f, &e), &e);
+	assert_int_equal(f.f.to_patches, 1);
+	assert_int_equal(f.f.entries, 6);
+	expect_block(&f.f, 0, one, same, 2);
+	expect_block(&f.f, 3, sum, summed, 2);
 	ff_file_close(&f);
 }
 
@@ -377,6 +434,70 @@ static void test_bad_model_is_not_written(void **state)
 
 /* ---- form factors that are refused ---- */
 
+/* Writes the file again with bytes of an array or a metadata string replaced, and
+ * digests that fit. */
+static void forge(const char *path, const char *name, size_t at, const void *value, size_t bytes)
+{
+	struct err e = { 0 };
+	struct container *c = container_open(path, NULL, &e);
+	struct container_writer *w = container_create(path, &e);
+
+	assert_true(c && w);
+	for (size_t i = 0; i < container_metas(c); i++) {
+		const char *text, *key = container_meta_at(c, i, &text);
+		if (strncmp(key, "digest.", 7))
+			must(container_meta(w, key, strcmp(key, name) ? text : value, &e), &e);
+	}
+	for (size_t i = 0; i < container_arrays(c); i++) {
+		const struct container_view *v = container_at(c, i);
+		size_t size = v->count * dtype_size(v->type);
+		char *data = copy(v->data, size);
+		if (strcmp(v->name, name) == 0) {
+			assert_true(at + bytes <= size);
+			memcpy(data + at, value, bytes);
+		}
+		must(container_put(w, v->name, v->type, v->dims, v->shape, data, &e), &e);
+		free(data);
+	}
+	must(container_finish(w, &e), &e);
+	container_close(c);
+}
+
+static void refuse_forged(const char *name, size_t at, const void *value, size_t bytes,
+                          const char *message)
+{
+	struct ff_file f;
+	struct err e = { 0 };
+
+	write_ff();
+	forge(ff_path, name, at, value, bytes);
+	if (!ff_file_open(ff_path, NULL, NULL, &f, &e) || !strstr(e.text, message))
+		fail_msg("'%s' instead of '%s'", e.set ? e.text : "accepted", message);
+	assert_non_null(strstr(e.text, "; run ffcalc again"));
+}
+
+#define FORGE(array, i, type, value, message) \
+	refuse_forged(array, (i) * sizeof(type), &(type){ value }, sizeof(type), message)
+
+static void test_forged_form_factors(void **state)
+{
+	(void)state;
+	FORGE("block_start", 1, uint64_t, 1000, "array block_start");
+	FORGE("block_start", 4, uint64_t, 5, "array value: row 2 sums to 0.875 instead of 1");
+	FORGE("block_column", 1, uint64_t, 3, "array block_column: block 0 has more columns than");
+	FORGE("block_column", 2, uint64_t, 1, "array block_column: values 1 and 2 do not ascend");
+	FORGE("block_column", 4, uint64_t, 4, "array block_column: block 3 has an odd number");
+	FORGE("block_column", 5, uint64_t, 7, "array block_column: it runs from 0 to 7");
+	FORGE("column", 3, uint32_t, 6, "array column: value 3 is 6, which must be below 6");
+	FORGE("column", 3, uint32_t, 2, "array column: value 4 is 3, with which 3 columns end beyond");
+	FORGE("column", 4, uint32_t, 0, "array column: value 4 is 0 and counts columns");
+	FORGE("column", 4, uint32_t, UINT32_MAX, "array column: value 4 is 4294967295, with which");
+	FORGE("column", 4, uint32_t, 2, "array column: block 3 has 1 values too many");
+	refuse_forged("receivers", 0, "walls", 0, "metadata receivers: walls, neither elements");
+	refuse_forged("receivers", 0, "patches", 0, "array column: value 1 is 4, which must be below 4");
+	refuse_forged("version", 0, "1", 0, "version 1, this program knows version 2");
+}
+
 static void refuse_ff(void *where, const void *value, size_t bytes, const char *message)
 {
 	unsigned char old[8];
@@ -385,7 +506,7 @@ static void refuse_ff(void *where, const void *value, size_t bytes, const char *
 
 	memcpy(old, where, bytes);
 	memcpy(where, value, bytes);
-	must(try_write_ff(&ff, &e), &e);
+	must(try_write_ff(&ff, 0, &e), &e);
 	memcpy(where, old, bytes);
 	if (!ff_file_open(ff_path, NULL, NULL, &f, &e) || !strstr(e.text, message))
 		fail_msg("'%s' instead of '%s'", e.set ? e.text : "accepted", message);
@@ -412,7 +533,6 @@ static void test_refused_form_factors(void **state)
 	REFUSE(ff.row_kind[1], uint8_t, 4, "array row_kind: value 1 is 4");
 	REFUSE(ff.row_block[1], uint64_t, 0, "array row_block");
 	REFUSE(ff.row_block[1], uint64_t, UINT64_MAX, "array row_block");
-	REFUSE(ff.block_start[1], uint64_t, 1000, "array block_start");
 	REFUSE(ff.block_arrival[1], uint64_t, 2, "array block_arrival");
 	REFUSE(ff.block_chain[0], uint32_t, 1, "array block_chain: row 0 does not begin");
 	REFUSE(ff.block_chain[1], uint32_t, 0, "array block_chain: block 1 is out of order");
@@ -580,11 +700,14 @@ int main(void)
 		cmocka_unit_test(test_mesh),
 		cmocka_unit_test(test_rad),
 		cmocka_unit_test(test_ff),
+		cmocka_unit_test(test_lists_and_spans),
+		cmocka_unit_test(test_ff_to_patches),
 		cmocka_unit_test(test_ff_of_another_geometry),
 		cmocka_unit_test(test_ids),
 		cmocka_unit_test(test_refused_models),
 		cmocka_unit_test(test_bad_model_is_not_written),
 		cmocka_unit_test(test_refused_form_factors),
+		cmocka_unit_test(test_forged_form_factors),
 		cmocka_unit_test(test_damaged),
 		cmocka_unit_test(test_wrong_kind),
 		cmocka_unit_test(test_foreign_ids),

@@ -7,6 +7,9 @@
 
 #include <cmocka.h>
 
+#include <unistd.h>
+
+#include "../../formats/ff_file.h"
 #include "../../lib/bsdf.h"
 #include "../../lib/radiosity.h"
 #include "grid.h"
@@ -30,29 +33,36 @@ static void set_diffuse(struct model *m, size_t material, double rho, double exi
 	mt->emission[material_at(mt, material, FRONT)] = exitance / 3.14159265358979323846;
 }
 
+static void solution_of(const struct model *m, const struct ff *f, struct solution *s)
+{
+	const struct ff *shard[] = { f };
+	const char *name[] = { "memory" };
+	struct transport t;
+	struct err e = { 0 };
+	struct radiosity_options ro = { 1e-9, UINT64_MAX, 2 };
+	struct radiosity_report r;
+
+	assert_int_equal(transport_init(&t, m, shard, name, 1, 2, &e), 0);
+	assert_int_equal(solution_begin(s, m, &t, &e), 0);
+	if (radiosity_shoot(s, &t, &ro, NULL, &r, &e)) {
+		print_error("%s\n", e.text);
+		fail();
+	}
+	assert_int_equal(radiosity_gather(s, &t, 2, &r, &e), 0);
+	assert_true(r.residual <= 1e-12);
+	transport_free(&t);
+}
+
 /* Solves; h[i] is the area mean of the irradiance of patch-side side[i]. */
 static void solve(const struct model *m, const struct ff_options *o, const uint32_t *side,
                   size_t n, double *h)
 {
 	struct ff f;
-	const struct ff *shard[] = { &f };
-	const char *name[] = { "memory" };
 	struct ff_stats stats;
-	struct transport t;
 	struct solution s;
-	struct err e = { 0 };
-	struct radiosity_options ro = { 1e-9, UINT64_MAX, 2 };
-	struct radiosity_report r;
 
 	memory_ff(m, o, &f, &stats);
-	assert_int_equal(transport_init(&t, m, shard, name, 1, 2, &e), 0);
-	assert_int_equal(solution_begin(&s, m, &t, &e), 0);
-	if (radiosity_shoot(&s, &t, &ro, NULL, &r, &e)) {
-		print_error("%s\n", e.text);
-		fail();
-	}
-	assert_int_equal(radiosity_gather(&s, &t, 2, &r, &e), 0);
-	assert_true(r.residual <= 1e-12);
+	solution_of(m, &f, &s);
 	for (size_t k = 0; k < n; k++) {
 		uint32_t p = side[k] >> 1;
 		h[k] = 0;
@@ -60,7 +70,6 @@ static void solve(const struct model *m, const struct ff_options *o, const uint3
 			h[k] += solution_irradiance(&s, 2 * i + (side[k] & 1), 0) *
 			        m->element_area[i] / m->patch_area[p];
 	}
-	transport_free(&t);
 	solution_free(&s);
 	ff_free(&f);
 }
@@ -94,19 +103,31 @@ static void furnace_by_hemicubes(void **state)
 	furnace(&cubes, .05);
 }
 
-/* A mirror-walled box is a pair of infinite plates: H_ceiling = E / (1 - rho^2). */
-static void plates(const struct ff_options *o, double lobe_exponent, double tolerance)
+/* Band k like band 0, but emission k + 1 times. */
+static void spread_bands(struct materials *mt)
 {
-	struct model m;
+	double *coefficient[] = { mt->rho_d, mt->tau_d, mt->rho_s, mt->tau_s, mt->emission };
+
+	for (size_t c = 0; c < sizeof coefficient / sizeof *coefficient; c++)
+		for (size_t side = 0; side < 2 * mt->n; side++)
+			for (int k = 1; k < mt->bands; k++) {
+				double *x = coefficient[c] + side * (size_t)mt->bands;
+				x[k] = x[0] * (coefficient[c] == mt->emission ? k + 1 : 1);
+			}
+}
+
+/* A mirror-walled box with a sheet of all kinds of material across it. */
+static void plates_model(struct model *m, double lobe_exponent, int bands)
+{
 	const uint32_t material[6] = { 0, 0, 0, 0, 1, 2 };
 	const double at[3] = { 0, 0, .5 }, x[3] = { 1, 0, 0 }, y[3] = { 0, 1, 0 };
-	struct materials *mt = &m.material;
+	struct materials *mt = &m->material;
 
-	grid_new(&m, 7, 2, 4, 1);
-	grid_box(&m, 2, material, zero, one);
-	grid_quad(&m, 2, 3, at, x, y);
+	grid_new(m, 7, 2, 4, bands);
+	grid_box(m, 2, material, zero, one);
+	grid_quad(m, 2, 3, at, x, y);
 	for (size_t k = 0; k < 3; k++)
-		set_diffuse(&m, k, k == 0 ? 0 : k == 1 ? .5 : .4, k == 1);
+		set_diffuse(m, k, k == 0 ? 0 : k == 1 ? .5 : .4, k == 1);
 	mt->rho_s[material_at(mt, 0, FRONT)] = 1;
 	const double front[4] = { .1, .15, .25, .4 }, back[4] = { .2, .1, .25, .4 };
 	double *coefficient[4] = { mt->rho_d, mt->tau_d, mt->rho_s, mt->tau_s };
@@ -116,7 +137,16 @@ static void plates(const struct ff_options *o, double lobe_exponent, double tole
 	}
 	for (int s = 0; s < 2; s++)
 		mt->alpha[6 + s] = mt->beta[6 + s] = lobe_exponent;
-	grid_end(&m);
+	spread_bands(mt);
+	grid_end(m);
+}
+
+/* It is a pair of infinite plates: H_ceiling = E / (1 - rho^2). */
+static void plates(const struct ff_options *o, double lobe_exponent, double tolerance)
+{
+	struct model m;
+
+	plates_model(&m, lobe_exponent, 1);
 	const double expected[4] = { 1.4063777596075226, .3270645952575634, .8127555192150451,
 		.8176614881439084 };
 	const uint32_t side[4] = { 2 * 6 + 1, 2 * 6, 2 * 4, 2 * 5 };
@@ -144,6 +174,125 @@ static void plates_by_hemicubes(void **state)
 	plates(&cubes, (double)INFINITY, .01);
 	plates(&cubes, 1, .01);
 	plates(&cubes, 10, .01);
+}
+
+/* Bands are independent, in the same vector or not. */
+static void six_bands(void **state)
+{
+	struct model m;
+	struct ff f;
+	struct ff_stats stats;
+	struct solution s;
+
+	(void)state;
+	plates_model(&m, 10, 6);
+	memory_ff(&m, &rays, &f, &stats);
+	solution_of(&m, &f, &s);
+	for (size_t i = 0; i < 2 * m.elements; i++)
+		for (int k = 1; k < 6; k++) {
+			double h = (k + 1) * solution_irradiance(&s, i, 0), e = (k + 1) * s.error[6 * i];
+			assert_true(fabs(solution_irradiance(&s, i, k) - h) <= 1e-12 * h);
+			assert_true(fabs(s.error[6 * i + (size_t)k] - e) <= 1e-5 * e);
+		}
+	solution_free(&s);
+	ff_free(&f);
+	model_free(&m);
+}
+
+/* Through a file whose receivers are patches or elements. */
+static void solve_file(const struct model *m, const struct ff *f, int to_patches,
+                       struct solution *s)
+{
+	char path[] = "/tmp/twopass-radiosity-XXXXXX";
+	struct cache_info info = { 0 };
+	struct ff_file file;
+	struct err e = { 0 };
+	int fd = mkstemp(path);
+
+	assert_true(fd >= 0);
+	close(fd);
+	struct ff_writer *w = ff_file_create(path, m, f->value64 != NULL, to_patches, &e);
+	if (!w || ff_file_append(w, f, &e) || ff_file_finish(w, f, &info, &e) ||
+	    ff_file_open(path, m, NULL, &file, &e))
+		fail_msg("%s", e.text);
+	solution_of(m, &file.f, s);
+	ff_file_close(&file);
+	unlink(path);
+}
+
+static double patch_mean(const struct model *m, const struct solution *s, uint32_t ps, int k)
+{
+	uint32_t p = ps >> 1;
+	double h = 0;
+
+	for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++)
+		h += solution_irradiance(s, 2 * i + (ps & 1), k) * m->element_area[i] /
+		     m->patch_area[p];
+	return h;
+}
+
+/* Patches as receivers: the same flux for each patch, the same irradiance all over it;
+ * and lists, as they are in memory, solve like spans. */
+static void patches_as_receivers(const struct ff_options *o, double exponent, double tolerance)
+{
+	struct model m;
+	struct ff f;
+	struct ff_stats stats;
+	struct solution memory, elements, patches;
+
+	plates_model(&m, exponent, 1);
+	for (size_t i = 0; i < m.material.n; i++)
+		m.material.name[i] = strdup("material");
+	for (size_t i = 0; i < m.surface.n; i++)
+		m.surface.name[i] = strdup("surface");
+	memory_ff(&m, o, &f, &stats);
+	solution_of(&m, &f, &memory);
+	solve_file(&m, &f, 0, &elements);
+	solve_file(&m, &f, 1, &patches);
+	for (size_t i = 0; i < 2 * m.elements; i++) {
+		uint32_t ps = 2 * m.element_patch[i >> 1] + (uint32_t)(i & 1);
+		double h = solution_irradiance(&patches, i, 0);
+		assert_true(solution_irradiance(&memory, i, 0) == solution_irradiance(&elements, i, 0));
+		assert_true(memory.error[i] == elements.error[i]);
+		assert_true(fabs(h - patch_mean(&m, &elements, ps, 0)) <= tolerance * h);
+		assert_true(h == solution_irradiance(&patches, 2 * m.patch_start[ps >> 1] + (i & 1), 0));
+	}
+	solution_free(&memory);
+	solution_free(&elements);
+	solution_free(&patches);
+	ff_free(&f);
+	model_free(&m);
+}
+
+static void patches_as_receivers_f32(void **state)
+{
+	(void)state;
+	patches_as_receivers(&rays, 10, 1e-6);
+}
+
+static void patches_as_receivers_f64(void **state)
+{
+	struct ff_options o = cubes;
+
+	(void)state;
+	o.f64 = 1;
+	patches_as_receivers(&o, (double)INFINITY, 1e-11);
+	patches_as_receivers(&o, 1, 1e-11);
+}
+
+static void shards_of_two_kinds(void **state)
+{
+	struct ff a = { .part = 1, .parts = 2 }, b = { .part = 2, .parts = 2, .to_patches = 1 };
+	const struct ff *shard[] = { &a, &b };
+	const char *name[] = { "a.ff", "b.ff" };
+	const struct model m = { 0 };
+	struct transport t;
+	struct err e = { 0 };
+
+	(void)state;
+	assert_int_equal(transport_init(&t, &m, shard, name, 2, 1, &e), -1);
+	assert_non_null(strstr(e.text, "b.ff: receivers are patches, but elements of a.ff"));
+	transport_free(&t);
 }
 
 static void white_box_has_no_steady_state(void **state)
@@ -183,6 +332,10 @@ int main(void)
 		cmocka_unit_test(furnace_by_hemicubes),
 		cmocka_unit_test(plates_by_rays),
 		cmocka_unit_test(plates_by_hemicubes),
+		cmocka_unit_test(six_bands),
+		cmocka_unit_test(patches_as_receivers_f32),
+		cmocka_unit_test(patches_as_receivers_f64),
+		cmocka_unit_test(shards_of_two_kinds),
 		cmocka_unit_test(white_box_has_no_steady_state),
 	};
 

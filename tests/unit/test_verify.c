@@ -58,6 +58,46 @@ static void test_matrix(void **state)
 	model_free(&m);
 }
 
+/* The same factors with patches as receivers make the same matrix. */
+static void test_matrix_of_patches(void **state)
+{
+	const uint32_t column[] = { 1, 2, 2, 0, 2, 2 };
+	const float value[] = { .25f, .25f, .125f, .25f, .125f, .5f };
+	const uint64_t start[] = { 0, 2, 3, 3, 5, 6 };
+	struct model m;
+	struct ff elements, patches;
+	struct patch_matrix a, b;
+	struct verify v;
+	struct err e = { 0 };
+	double row[2][3], black[2], escape[2];
+
+	(void)state;
+	small_model(&m);
+	small_ff(&elements);
+	small_ff(&patches);
+	patches.to_patches = 1;
+	patches.entries = 6;
+	memcpy(patches.column, column, sizeof column);
+	memcpy(patches.value, value, sizeof value);
+	memcpy(patches.block_start, start, sizeof start);
+	struct ff_scene s = scene_of(&m);
+	assert_int_equal(ff_check(&patches, &s, &e), 0);
+	assert_int_equal(verify_ff(&patches, &s, &v, &e), 0);
+	assert_int_equal(patch_matrix_init(&a, &elements, &s, &e), 0);
+	assert_int_equal(patch_matrix_init(&b, &patches, &s, &e), 0);
+	for (size_t i = 0; i < 3; i++) {
+		patch_matrix_row(&a, i, row[0], &black[0], &escape[0]);
+		patch_matrix_row(&b, i, row[1], &black[1], &escape[1]);
+		assert_memory_equal(row[0], row[1], sizeof row[0]);
+		assert_true(black[0] == black[1] && escape[0] == escape[1]);
+	}
+	patch_matrix_free(&a);
+	patch_matrix_free(&b);
+	ff_free(&elements);
+	ff_free(&patches);
+	model_free(&m);
+}
+
 /* Two plates of areas 1 and 2 that see only each other: F_01 = .5, F_10 = .25. */
 static void exchange(double f01, double f10, double error, struct verify *v)
 {
@@ -149,10 +189,53 @@ static void test_side_rows(void **state)
 	model_free(&m);
 }
 
+/* Eight elements of one patch that sees itself, in two spans. */
+static void spans(uint32_t first0, uint32_t count0, uint32_t first1, uint32_t count1,
+                  const char *message)
+{
+	uint32_t start[] = { 0, 8 }, side[] = { 0 }, samples[] = { 1 }, chain[] = { 0 };
+	uint32_t column[] = { first0, count0, first1, count1 };
+	double area[] = { 1 }, one[] = { 1 }, zero[] = { 0 };
+	float value[8] = { .125f, .125f, .125f, .125f, .125f, .125f, .125f, .125f };
+	uint64_t row_block[] = { 0, 1 }, entries[] = { 0, 8 }, words[] = { 0, 4 }, none[] = { 0, 0 };
+	uint8_t kind[] = { FF_DIFFUSE }, sides2[] = { 3 };
+	const struct ff f = { .chains = 1, .chain_start = none, .rows = 1, .row_side = side,
+		.row_kind = kind, .row_samples = samples, .row_scale = one, .row_residual = zero,
+		.row_error = zero, .row_block = row_block, .blocks = 1, .block_chain = chain,
+		.block_start = entries, .block_column = words, .block_escape = zero,
+		.block_black = zero, .block_lost = zero, .block_cut = zero, .block_arrival = none,
+		.entries = 8, .columns = 4, .column = column, .value = value, .patch_end = 1,
+		.part = 1, .parts = 1 };
+	const struct ff_scene s = { 1, 8, 1, start, area, sides2 };
+	struct err e = { 0 };
+
+	if (ff_check(&f, &s, &e) != (message ? -1 : 0) || (message && !strstr(e.text, message)))
+		fail_msg("'%s' instead of '%s'", e.set ? e.text : "accepted",
+		         message ? message : "accepted");
+}
+
+static void test_spans(void **state)
+{
+	(void)state;
+	spans(0, 4, 8, 4, NULL);
+	spans(4, 6, 1, 2, NULL); /* fronts, then backs of the patch */
+	spans(0, 4, 6, 4, "array column: value 2 is out of order");
+	spans(8, 4, 0, 4, "array column: value 2 is out of order");
+	spans(1, 4, 0, 4, "array column: value 2 is out of order");
+	spans(16, 4, 8, 4, "array column: value 0 is 16, which must be below 16");
+	spans(0, 0, 8, 4, "array column: value 1 is 0 and counts columns");
+	spans(0, 4, 8, 5, "array column: value 3 is 5, with which 5 columns end beyond 16");
+	spans(0, 4, 8, UINT32_MAX, "array column: value 3 is 4294967295, with which");
+	spans(0, 5, 1, 4, "array column: value 3 is 4, with which block 0 has more columns");
+	spans(0, 4, 8, 3, "array column: block 0 has 1 values too many");
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_matrix),
+		cmocka_unit_test(test_matrix_of_patches),
+		cmocka_unit_test(test_spans),
 		cmocka_unit_test(test_reciprocity),
 		cmocka_unit_test(test_ledger),
 		cmocka_unit_test(test_side_rows),
