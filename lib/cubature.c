@@ -80,6 +80,19 @@ static void product_points(const double *const q[4], int level, struct cubature 
 		}
 }
 
+/* 3 points of degree 2 on a triangle, and a fourth of weight 0. */
+static void triangle_points_2(const double *const q[3], struct cubature *c)
+{
+	double area = twice_area(q[0], q[1], q[2]) / 2, x[3];
+
+	for (int i = 0; i < 3; i++) {
+		for (int k = 0; k < 3; k++)
+			x[k] = (4 * q[i][k] + q[(i + 1) % 3][k] + q[(i + 2) % 3][k]) / 6;
+		put(c, x, area / 3);
+	}
+	put(c, x, 0);
+}
+
 /* Radon's 7 points of degree 5 on a triangle, and an eighth of weight 0. */
 static void triangle_points(const double *const q[3], struct cubature *c)
 {
@@ -125,12 +138,15 @@ void cubature_fill(const struct facet *f, int level, struct cubature *c)
 		int last = 2 * i + 3;
 		for (int k = 0; k < 4; k++)
 			q[k] = &f->v[3 * (k == 0 ? 0 : 2 * i + k < f->n ? 2 * i + k : f->n - 1)];
-		if (level != 1)
-			product_points(q, level, c);
-		else if (last < f->n)
+		int triangle = last == f->n;
+		if (level == 0 && triangle)
+			triangle_points_2(q, c);
+		else if (level == 1 && triangle)
+			triangle_points(q, c);
+		else if (level == 1)
 			square_points(q, c);
 		else
-			triangle_points(q, c);
+			product_points(q, level, c);
 	}
 }
 

@@ -22,8 +22,9 @@ struct cubature {
 int cubature_points(int corners, int level);
 
 /* Fills c (room for cubature_points doubles in each array) for a facet.
- * Levels 0, 2, 3: products of 2, 4, 6 Gauss-Legendre points on a bilinear map; level 1:
- * Radon's 7 points of degree 5 (triangles; quadrilaterals). Stroud 1971. */
+ * Levels 0, 2, 3: products of 2, 4, 6 Gauss-Legendre points on a bilinear map, but 3
+ * points of degree 2 on a triangle at level 0; level 1: Radon's 7 points of degree 5
+ * (triangles; quadrilaterals). Stroud 1971. */
 void cubature_fill(const struct facet *f, int level, struct cubature *c);
 
 /* Exchange area, m^2, of two facets in front of one another. O(points a x points b). */

@@ -36,7 +36,8 @@ struct matrix {
 	size_t first, rows;
 	float *e32;                   /* [rows][n] exchange areas, one of them */
 	double *e64;
-	double *variance;             /* [rows] sum of squared errors of exchange areas */
+	double *variance, *doubts;    /* [rows] sums of squared errors, and of errors, of
+	                                 exchange areas */
 };
 
 static double get(const struct matrix *m, size_t row, size_t j)
@@ -122,12 +123,15 @@ static int gather_doubts(struct matrix *m, struct err *e)
 	if (!bad && all.n)
 		qsort(all.data, all.n, sizeof(struct doubt), by_pair);
 	memset(m->variance, 0, m->rows * sizeof *m->variance);
+	memset(m->doubts, 0, m->rows * sizeof *m->doubts);
 	for (size_t k = 0; !bad && k < all.n; k++) {
 		const struct doubt *d = (const struct doubt *)all.data + k;
 		const uint32_t end[2] = { d->i, d->j };
 		for (int s = 0; s < 2; s++)
-			if (end[s] >= m->first && end[s] < m->first + m->rows)
+			if (end[s] >= m->first && end[s] < m->first + m->rows) {
 				m->variance[end[s] - m->first] += d->error * d->error;
+				m->doubts[end[s] - m->first] += d->error;
+			}
 	}
 	free(all.data);
 	return bad;
@@ -172,14 +176,17 @@ static int put_row(struct ff_batch *b, const struct matrix *m, size_t r, struct 
 		if (x > 0)
 			sum += batch_put_value(b, m->side[j], x / area);
 	}
-	row.error = sqrt(m->variance[r]) / area + m->thread[0].x.o.relative * sum;
+	double relative = m->thread[0].x.o.relative;
+	row.error = sqrt(m->variance[r]) / area + relative * sum;
 	row.residual = 1 - sum;
+	/* What is missing of a closed row is its error, of others what nothing received. */
 	if (row.residual > 0) {
 		uint32_t escapes, blacks;
 		rest(m, ps, &escapes, &blacks);
-		if (escapes + blacks) {
-			row.escape = row.residual * escapes / (escapes + blacks);
-			row.black = row.residual * blacks / (escapes + blacks);
+		if (escapes + blacks || row.residual > m->doubts[r] / area + 2 * relative * sum) {
+			double all = escapes + blacks ? escapes + blacks : 1;
+			row.black = row.residual * blacks / all;
+			row.escape = row.residual - row.black;
 			row.residual = 0;
 		}
 	}
@@ -218,7 +225,8 @@ static int bands(struct matrix *m, size_t begin, size_t end, const struct ff_sin
 	most = most < 1 ? 1 : most < end - begin ? most : end - begin;
 	void *room = mem_new(most * m->n, size, "exchange areas", e);
 	m->variance = mem_new(most, sizeof *m->variance, "exchange areas", e);
-	if (!room || !m->variance) {
+	m->doubts = mem_new(most, sizeof *m->doubts, "exchange areas", e);
+	if (!room || !m->variance || !m->doubts) {
 		free(room);
 		return -1;
 	}
@@ -287,6 +295,7 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
 	free(m.side);
 	free(m.area);
 	free(m.variance);
+	free(m.doubts);
 	facet_set_free(&m.facets);
 	body_set_free(&m.bodies);
 	return bad ? -1 : 0;
