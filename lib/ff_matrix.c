@@ -177,7 +177,7 @@ static int put_row(struct ff_batch *b, const struct matrix *m, size_t r, struct 
 			sum += batch_put_value(b, m->side[j], x / area);
 	}
 	double relative = m->thread[0].x.o.relative;
-	row.error = sqrt(m->variance[r]) / area + relative * sum;
+	row.error = m->doubts[r] / area + relative * sum;
 	row.residual = 1 - sum;
 	/* What is missing of a closed row is its error, of others what nothing received. */
 	if (row.residual > 0) {

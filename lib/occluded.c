@@ -182,8 +182,10 @@ static int refine(struct integral *in, size_t i)
 		left += !dark(in, &part[left], f);
 	}
 	/* A rule of fourth order leaves a fifteenth of the difference where what is seen is
-	 * smooth, a third across the edge of a shadow. */
-	double off = fabs(sum + in->settled - before - c.value) / ((in->cut && n == 4 ? 8 : 3) * left);
+	 * smooth, a third across the edge of a shadow; more where edges of several blockers
+	 * cross one another before g, which no cut follows. */
+	int several = (c.blockers & (c.blockers - 1)) != 0;
+	double off = fabs(sum + in->settled - before - c.value) / ((several ? 1 : 3) * left);
 	for (int k = 0; k < left; k++) {
 		struct facet f = cell_facet(&part[k]);
 		part[k].error = fmax(off, doubt(in, &part[k], &f, n == 4));
