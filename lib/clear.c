@@ -41,8 +41,8 @@ static int level(const struct clear *x, const struct facet *f, double gap)
 static const struct cubature *points(struct clear *x, int which, const struct facet *f,
                                      const struct cubature *stored, int l, struct cubature *room)
 {
-	if (stored)
-		return stored;
+	if (stored && stored[l].n)
+		return &stored[l];
 	*room = (struct cubature){ 0, x->points[which][0], x->points[which][1],
 	                           x->points[which][2], x->points[which][3] };
 	cubature_fill(f, l, room);
@@ -73,11 +73,8 @@ double clear_exchange(struct clear *x, const struct facet *a, const struct cubat
 	int la = level(x, a, apart - b->radius), lb = level(x, b, apart - a->radius);
 
 	if (la < CUBATURE_LEVELS && lb < CUBATURE_LEVELS) {
-		const struct cubature *ca = points(x, 0, a, la < CUBATURE_STORED && pa ? pa + la : NULL,
-		                                   la, &ra);
-		const struct cubature *cb = points(x, 1, b, lb < CUBATURE_STORED && pb ? pb + lb : NULL,
-		                                   lb, &rb);
-		return cubature_exchange(a, ca, b, cb);
+		return cubature_exchange(a, points(x, 0, a, pa, la, &ra), b,
+		                         points(x, 1, b, pb, lb, &rb));
 	}
 	/* A small facet close to a large one. */
 	const struct facet *small = a->radius < b->radius ? a : b, *large = small == a ? b : a;

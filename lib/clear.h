@@ -16,7 +16,7 @@ struct clear {
 void clear_init(struct clear *c, double relative);
 
 /* Exchange area, m^2, of facets that lie in front of one another. pa, pb: their stored
- * points [CUBATURE_STORED], or NULL. */
+ * points [CUBATURE_LEVELS], or NULL. */
 double clear_exchange(struct clear *c, const struct facet *a, const struct cubature *pa,
                       const struct facet *b, const struct cubature *pb);
 

@@ -164,6 +164,8 @@ double cubature_exchange(const struct facet *a, const struct cubature *ca,
 	}
 	for (int i = 0; i < ca->n; i++) {
 		four all = { 0 };
+		if (ca->w[i] == 0)
+			continue;
 		double h = b->normal[0] * ca->x[i] + b->normal[1] * ca->y[i] +
 		           b->normal[2] * ca->z[i] - b->offset;
 		for (int j = 0; j < cb->n; j += 4) {

@@ -8,7 +8,7 @@
 
 #include "facet.h"
 
-enum { CUBATURE_LEVELS = 4, CUBATURE_STORED = 2 };
+enum { CUBATURE_LEVELS = 4 };
 
 /* Points of a facet at one level, by coordinate; n is a multiple of four, with points of
  * weight 0 at the end. Weights sum to the facet's area. */

@@ -78,8 +78,12 @@ static double crowded(struct exchanger *x, const struct facet *a, const struct f
 static const struct facet *front_part(const struct facet *f, const struct facet *of, double near,
                                       struct facet_room *room, const struct cubature **points)
 {
-	double lowest, highest;
+	double lowest, highest, h = v3_dot(of->normal, f->centre) - of->offset;
 
+	if (h >= f->radius)
+		return f;
+	if (h <= -f->radius)
+		return NULL;
 	facet_heights(f, of->normal, of->offset, &lowest, &highest);
 	if (highest <= near)
 		return NULL;
@@ -89,19 +93,10 @@ static const struct facet *front_part(const struct facet *f, const struct facet 
 	return facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
 }
 
-static const struct cubature *stored(const struct facet_set *s, uint32_t i,
-                                     struct cubature at[CUBATURE_STORED])
-{
-	for (int l = 0; l < CUBATURE_STORED; l++)
-		at[l] = s->stored[l][i];
-	return at;
-}
-
 double exchange(struct exchanger *x, const struct facet_set *sa, uint32_t i,
                 const struct facet_set *sb, uint32_t j, double *error, struct err *e)
 {
-	struct cubature ra[CUBATURE_STORED], rb[CUBATURE_STORED];
-	const struct cubature *pa = stored(sa, i, ra), *pb = stored(sb, j, rb);
+	const struct cubature *pa = sa->stored[i], *pb = sb->stored[j];
 	struct facet_room room[2];
 	double near = x->bodies->near;
 	const struct facet *fa = &sa->facet[i], *fb = &sb->facet[j];

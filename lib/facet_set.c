@@ -19,6 +19,8 @@ void facet_centre(const struct model *m, double centre[3])
 	}
 }
 
+enum { KEEP_ALL = 1 << 15, KEEP_OF_MANY = 2 };
+
 /* What is being built. */
 struct maker {
 	struct facet_set *s;
@@ -114,26 +116,25 @@ static int put_element_side(struct maker *k, uint32_t es)
 	return put(k, &m->element[3 * (size_t)(es >> 1)], 3, (int)(es & 1));
 }
 
+/* Keeps the points of all levels, or of the cheap ones where facets are many. */
 static int store_points(struct facet_set *s, struct err *e)
 {
+	int levels = s->facets <= KEEP_ALL ? CUBATURE_LEVELS : KEEP_OF_MANY;
 	size_t total = 0;
 
-	for (int l = 0; l < CUBATURE_STORED; l++) {
-		s->stored[l] = mem_new(s->facets, sizeof *s->stored[l], "cubature points", e);
-		if (!s->stored[l])
-			return -1;
-		for (size_t i = 0; i < s->facets; i++)
+	for (size_t i = 0; i < s->facets; i++)
+		for (int l = 0; l < levels; l++)
 			total += (size_t)cubature_points(s->facet[i].n, l);
-	}
+	s->stored = mem_new(s->facets, sizeof *s->stored, "cubature points", e);
 	s->points = mem_new(total, 4 * sizeof *s->points, "cubature points", e);
-	if (!s->points)
+	if (!s->stored || !s->points)
 		return -1;
 	double *at = s->points;
-	for (int l = 0; l < CUBATURE_STORED; l++)
-		for (size_t i = 0; i < s->facets; i++) {
+	for (size_t i = 0; i < s->facets; i++)
+		for (int l = 0; l < levels; l++) {
 			size_t n = (size_t)cubature_points(s->facet[i].n, l);
-			s->stored[l][i] = (struct cubature){ 0, at, at + n, at + 2 * n, at + 3 * n };
-			cubature_fill(&s->facet[i], l, &s->stored[l][i]);
+			s->stored[i][l] = (struct cubature){ 0, at, at + n, at + 2 * n, at + 3 * n };
+			cubature_fill(&s->facet[i], l, &s->stored[i][l]);
 			at += 4 * n;
 		}
 	return 0;
@@ -171,8 +172,7 @@ void facet_set_free(struct facet_set *s)
 	free(s->start);
 	free(s->facet);
 	free(s->corner);
-	for (int l = 0; l < CUBATURE_STORED; l++)
-		free(s->stored[l]);
+	free(s->stored);
 	free(s->points);
 	*s = (struct facet_set){ 0 };
 }

@@ -15,7 +15,7 @@ struct facet_set {
 	uint32_t *start;          /* [places+1] first facet */
 	struct facet *facet;      /* their corners are in `corner` */
 	double *corner;
-	struct cubature *stored[CUBATURE_STORED]; /* [facets] */
+	struct cubature (*stored)[CUBATURE_LEVELS]; /* [facets], n = 0: not kept */
 	double *points;           /* of all of them */
 };
 

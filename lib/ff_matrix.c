@@ -265,7 +265,7 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
               struct ff_stats *stats, const struct progress *progress, struct err *e)
 {
 	struct matrix m = { .job = j };
-	struct exchange_options o = { .relative = j->o.f64 ? 1e-9 : 1e-7, .absolute = j->o.target,
+	struct exchange_options o = { .relative = j->o.f64 ? 1e-9 : 4e-7, .absolute = j->o.target,
 	                              .most = j->o.evaluations };
 	size_t a = 0, b;
 	int bad = find_sides(&m, e) || facet_set_init(&m.facets, j->m, FACETS_OF_PATCHES, e) ||

@@ -12,8 +12,9 @@ static void grow_box(struct sight_line *l, const struct facet *f)
 {
 	for (int i = 0; i < f->n; i++)
 		for (int k = 0; k < 3; k++) {
-			l->lo[k] = fmin(l->lo[k], f->v[3 * i + k]);
-			l->hi[k] = fmax(l->hi[k], f->v[3 * i + k]);
+			double x = f->v[3 * i + k];
+			l->lo[k] = x < l->lo[k] ? x : l->lo[k];
+			l->hi[k] = x > l->hi[k] ? x : l->hi[k];
 		}
 }
 
@@ -218,6 +219,8 @@ enum sight sight_find(struct sight_line *l, const struct body_set *set, const st
 	l->a = a;
 	l->b = b;
 	l->planes = l->bodies = 0;
+	if (!set->nodes)
+		return SIGHT_CLEAR;
 	for (int k = 0; k < 3; k++) {
 		l->lo[k] = INFINITY;
 		l->hi[k] = -INFINITY;
