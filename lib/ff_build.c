@@ -78,9 +78,13 @@ static uint64_t spread(uint32_t x)
 	return (v | v << 1) & 0x5555555555555555u;
 }
 
+struct sample {
+	uint32_t bits[FF_DIMS];
+};
+
 static int by_direction(const void *a, const void *b)
 {
-	const uint32_t *x = a, *y = b;
+	const uint32_t *x = ((const struct sample *)a)->bits, *y = ((const struct sample *)b)->bits;
 	uint64_t p = spread(rng_reverse_bits(x[2])) << 1 | spread(rng_reverse_bits(x[3]));
 	uint64_t q = spread(rng_reverse_bits(y[2])) << 1 | spread(rng_reverse_bits(y[3]));
 
@@ -90,16 +94,36 @@ static int by_direction(const void *a, const void *b)
 /* The sample points, each aligned block of a power of two in an order in which
  * neighbours have similar directions (their places on a Morton curve, which scrambling
  * keeps): rays and memory then see coherent work. A replicate is whole blocks. */
-static void fill_samples(struct ff_job *j)
+static int fill_samples(struct ff_job *j, struct err *e)
 {
-	uint32_t each = j->o.rays / FF_REPLICATES, block = each & (~each + 1);
+	uint32_t each = j->o.rays / FF_REPLICATES, block = each & (~each + 1), n = j->sobol_points;
+	struct sample *sample = mem_new(n, sizeof *sample, "sample points", e);
 
-	for (uint32_t i = 0; i < j->sobol_points; i++)
+	if (!sample)
+		return -1;
+	for (uint32_t i = 0; i < n; i++)
 		for (int d = 0; d < FF_DIMS; d++)
-			j->sobol[(size_t)i * FF_DIMS + (size_t)d] = rng_sobol_bits(i, d);
-	for (uint32_t i = 0; j->o.method == FF_RAYS && block && i + block <= j->sobol_points;
-	     i += block)
-		qsort(j->sobol + (size_t)i * FF_DIMS, block, FF_DIMS * sizeof *j->sobol, by_direction);
+			sample[i].bits[d] = rng_sobol_bits(i, d);
+	for (uint32_t i = 0; j->o.method == FF_RAYS && block && i + block <= n; i += block)
+		qsort(sample + i, block, sizeof *sample, by_direction);
+	for (uint32_t i = 0; i < n; i++)
+		for (uint32_t d = 0; d < FF_DIMS; d++)
+			j->sobol[(size_t)d * n + i] = sample[i].bits[d];
+	free(sample);
+	return 0;
+}
+
+/* A ray that lands on some sides has more to it than where it lands. */
+static int make_places(struct ff_job *j, struct err *e)
+{
+	uint8_t *apart = mem_new(2 * j->m->patches, 1, "patch flags", e);
+	int bad = !apart;
+
+	for (size_t ps = 0; !bad && ps < 2 * j->m->patches; ps++)
+		apart[ps] = j->is_black[ps] || j->is_ideal[ps] || j->has_lobe[ps];
+	bad = bad || tally_places_init(&j->places, j->m, apart, e);
+	free(apart);
+	return bad ? -1 : 0;
 }
 
 static int job_init(struct ff_job *j, const struct model *m, const struct ff_options *o,
@@ -112,11 +136,10 @@ static int job_init(struct ff_job *j, const struct model *m, const struct ff_opt
 	if (o->method == FF_HEMICUBE && (hemi_grid_init(&j->grid, (int)o->rays, e) ||
 	                                 !(j->cubes = hemi_scene_new(m, e))))
 		return -1;
-	fill_samples(j);
 	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
 		side_flags(j, ps);
 	ff_element_table(j);
-	return 0;
+	return fill_samples(j, e) || make_places(j, e) ? -1 : 0;
 }
 
 static void job_free(struct ff_job *j)
@@ -127,6 +150,7 @@ static void job_free(struct ff_job *j)
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
 	locator_free(&j->locator);
+	tally_places_free(&j->places);
 	ray_scene_free(j->rays);
 	hemi_scene_free(j->cubes);
 	hemi_grid_free(&j->grid);
@@ -135,7 +159,7 @@ static void job_free(struct ff_job *j)
 static int thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e)
 {
 	*t = (struct ff_thread){ .job = j };
-	if (tally_init(&t->tally, j->m, j->has_lobe, e))
+	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, e))
 		return -1;
 	if (j->o.method != FF_HEMICUBE)
 		return 0;

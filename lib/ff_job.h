@@ -11,13 +11,15 @@
 
 enum { FF_REPLICATES = 4, FF_DIMS = 5 };
 
-/* An element as a place to send rays from. */
+/* An element as a place to send rays from. Points are corner + w1 edge[0] + w2 edge[1],
+ * with weights that keep a little clear of the edges. Threes are padded to four. */
 struct ff_element {
+	double corner[4], edge[2][4];
+	float normal[4], tangent[2][4]; /* orthonormal; front */
 	double cdf;               /* area of the patch's elements up to and with this */
 	double per_area;
-	double corner[3], edge[2][3]; /* points are corner + w1 edge[0] + w2 edge[1], with
-	                             weights that keep a little clear of the edges */
-	double tangent[2][3];     /* with the front normal an orthonormal frame */
+	uint32_t before;          /* 2^32 times the part of the patch's area before it */
+	float per_part;           /* 1 / the same of its own area */
 };
 
 /* Shared, read-only while rows are computed. */
@@ -36,8 +38,9 @@ struct ff_job {
 	uint8_t *has_lobe;        /* [2P] light arriving here leaves by a finite lobe */
 	uint8_t *emits;           /* [2P] gives light of its own */
 	uint8_t *is_source;       /* [2P] any light leaves here */
-	uint32_t *sobol;          /* [sobol_points][FF_DIMS] bits */
+	uint32_t *sobol;          /* [FF_DIMS][sobol_points] bits */
 	uint32_t sobol_points;
+	struct tally_places places;
 };
 
 /* A way that light can come to a directional patch-side: sampled backwards. */
@@ -47,6 +50,15 @@ struct capture {
 	uint32_t view;            /* hemicube: which sample point */
 	double w;
 	double x[3], l[3];        /* the point, the unit direction to the source */
+};
+
+/* A batch of rays: numbers, origins, directions, where they land. */
+struct ff_batch_rays {
+	uint32_t element[RAY_BATCH];      /* where each begins */
+	uint32_t choice[RAY_BATCH];       /* 32 bits to choose the element by */
+	float u[4][RAY_BATCH];            /* numbers in [0,1): position, direction */
+	struct ray_batch ray;
+	uint32_t hit[RAY_BATCH];          /* element where each lands */
 };
 
 /* A hemicube's place: just off one side of the patch. */
@@ -67,6 +79,8 @@ struct ff_thread {
 	uint32_t *item;           /* hemicube: [points][2 sides][pixels] of the patch */
 	struct view *view;        /* hemicube: [points][2 sides] */
 	double rays;
+	struct ff_batch_rays lobe; /* lobe rays waiting to be cast */
+	uint32_t lobes;
 	struct vec chain_map;     /* local -> whole */
 };
 
@@ -77,23 +91,21 @@ void ff_element_table(struct ff_job *j);
  * position (on the surface, not moved off it). */
 uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, double x[3]);
 
-/* A batch of a row's rays, Lambertian from a patch-side, one array a coordinate. */
-enum { FF_BATCH = 64 };
-
-struct ff_batch_rays {
-	uint32_t element[FF_BATCH];       /* where each begins */
-	double org[3][FF_BATCH];          /* off the surface */
-	double dir[3][FF_BATCH];
-	double u[4][FF_BATCH];            /* the numbers they were made from */
-};
-
-/* Rays first to first + n (n <= FF_BATCH) of a scrambled replicate. */
+/* The numbers of rays first to first + n (n <= RAY_BATCH) of a scrambled replicate. */
 void ff_batch_numbers(const struct ff_job *j, const uint32_t seed[4], uint32_t first,
                       uint32_t n, struct ff_batch_rays *b);
-void ff_batch_origins(const struct ff_job *j, uint32_t patch_side, uint32_t n,
-                      struct ff_batch_rays *b);
-void ff_batch_directions(const struct ff_job *j, uint32_t patch_side, uint32_t n,
+
+/* Elements of a patch for the rays, by area; u[0] becomes what is left of the choice. */
+void ff_batch_elements(const struct ff_job *j, uint32_t patch, uint32_t n,
+                       struct ff_batch_rays *b);
+
+/* Origins off a side of the elements, and Lambertian directions from there. */
+void ff_batch_origins(const struct ff_job *j, int side, uint32_t n, struct ff_batch_rays *b);
+void ff_batch_directions(const struct ff_job *j, int side, uint32_t n,
                          struct ff_batch_rays *b);
+
+/* Casts n rays and finds the elements where they land. */
+void ff_batch_cast(const struct ff_job *j, uint32_t n, struct ff_batch_rays *b);
 
 /* Unit normal of a side of an element. */
 void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3]);
@@ -113,6 +125,9 @@ int ff_patch_hemicube(struct ff_thread *t, uint32_t patch, struct ff_batch *b, s
 /* Casts one lobe direction from a capture's point off a side. */
 typedef void ff_cast_fn(struct ff_thread *t, const struct capture *c, int side,
                         const double dir[3], double w);
+
+/* Casts what waits in t->lobe. */
+void ff_lobes_cast(struct ff_thread *t);
 
 /* Turns the captures of a directional patch-side into links with their G rows. */
 int ff_links(struct ff_thread *t, uint32_t patch_side, ff_cast_fn *cast, struct ff_batch *b,

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "vec3.h"
+
 struct tally_far {
 	uint64_t key;      /* slot, patch-side, element in that order */
 	uint32_t column;
@@ -39,17 +41,52 @@ static uint32_t slot_of(struct tally *t, uint32_t chain)
 	return *slot - 1;
 }
 
-int tally_init(struct tally *t, const struct model *m, const uint8_t *has_lobe, struct err *e)
+int tally_places_init(struct tally_places *p, const struct model *m, const uint8_t *apart,
+                      struct err *e)
 {
-	*t = (struct tally){ .m = m, .has_lobe = has_lobe, .far_most = FAR_MOST };
+	uint32_t place = 0;
+
+	*p = (struct tally_places){ 0 };
+	if (m->elements >= TALLY_APART / 2)
+		return err_set(e, "more than %u elements", TALLY_APART / 2 - 1);
+	p->place = mem_new(2 * m->elements, sizeof *p->place, "order of elements", e);
+	p->column = mem_new(2 * m->elements, sizeof *p->column, "order of elements", e);
+	if (!p->place || !p->column)
+		return -1;
+	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
+		for (uint32_t el = m->patch_start[ps >> 1]; el < m->patch_start[(ps >> 1) + 1]; el++) {
+			uint32_t column = 2 * el + (ps & 1);
+			p->place[column] = place | (apart[ps] ? TALLY_APART : 0);
+			p->column[place++] = column;
+		}
+	return 0;
+}
+
+void tally_places_free(struct tally_places *p)
+{
+	free(p->place);
+	free(p->column);
+	*p = (struct tally_places){ 0 };
+}
+
+int tally_init(struct tally *t, const struct model *m, const struct tally_places *places,
+               const uint8_t *has_lobe, struct err *e)
+{
+	size_t sides = 2 * m->elements;
+
+	*t = (struct tally){ .m = m, .places = places, .has_lobe = has_lobe,
+	                     .far_most = FAR_MOST, .words = (sides + 4095) / 4096 };
 	if (chains_init(&t->chains, m, e))
 		return -1;
-	t->dense = mem_new(2 * m->elements, sizeof *t->dense, "row tally", e);
+	t->count = mem_new(sides, sizeof *t->count, "row tally", e);
+	t->dense = mem_new(sides, sizeof *t->dense, "row tally", e);
+	t->seen = mem_new(64 * t->words, sizeof *t->seen, "row tally", e);
+	t->words_seen = mem_new(t->words, sizeof *t->words_seen, "row tally", e);
 	t->replicate = mem_new(2 * m->patches, sizeof *t->replicate, "row tally", e);
 	t->square = mem_new(2 * m->patches, sizeof *t->square, "row tally", e);
-	t->words = (2 * m->patches + 63) / 64;
-	t->seen = mem_new(t->words, sizeof *t->seen, "row tally", e);
-	if (!t->dense || !t->replicate || !t->square || !t->seen)
+	t->toward = mem_new(2 * m->patches, sizeof *t->toward, "row tally", e);
+	if (!t->count || !t->dense || !t->seen || !t->words_seen || !t->replicate ||
+	    !t->square || !t->toward)
 		return -1;
 	slot_of(t, 0); /* chain 0 is slot 0 of every row */
 	return t->err.set ? err_set(e, "%s", t->err.text) : 0;
@@ -57,8 +94,8 @@ int tally_init(struct tally *t, const struct model *m, const uint8_t *has_lobe, 
 
 void tally_free(struct tally *t)
 {
-	void *array[] = { t->dense, t->replicate, t->square, t->seen,
-		t->far.data, t->sort.data, t->rest.data, t->slot_chain.data,
+	void *array[] = { t->count, t->dense, t->seen, t->words_seen, t->replicate,
+		t->square, t->toward, t->far.data, t->sort.data, t->rest.data, t->slot_chain.data,
 		t->chain_slot.data, t->arrival.data };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
@@ -141,42 +178,97 @@ static void note_arrival(struct tally *t, uint32_t chain, uint32_t target, doubl
 	vec_append(&t->arrival, &a, 1, sizeof a, &t->err);
 }
 
+static void hit_near(struct tally *t, uint32_t place, uint32_t ps, double w)
+{
+	if (w == 1) {
+		tally_count(t, place);
+		return;
+	}
+	t->weighed = 1;
+	t->dense[place] += w;
+	t->replicate[ps] += w;
+	t->seen[place >> 6] |= (uint64_t)1 << (place & 63);
+	t->words_seen[place >> 12] |= (uint64_t)1 << (place >> 6 & 63);
+}
+
+static void hit_far(struct tally *t, uint32_t chain, uint32_t place, uint32_t element_side,
+                    double w)
+{
+	struct tally_far f = { slot_of(t, chain) * 2 * (uint64_t)t->m->elements + place,
+	                       element_side, w };
+
+	vec_append(&t->far, &f, 1, sizeof f, &t->err);
+	if (t->far.n >= t->far_most) {
+		merge_far(t, &t->err);
+		t->far_most = t->far.n > FAR_MOST / 2 ? 2 * t->far.n : FAR_MOST;
+	}
+}
+
 void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
                const double dir[3])
 {
-	uint32_t element = element_side >> 1, side = element_side & 1;
-	uint32_t p = t->m->element_patch[element], ps = 2 * p + side;
+	uint32_t ps = 2 * t->m->element_patch[element_side >> 1] + (element_side & 1);
+	uint32_t place = t->places->place[element_side] & ~TALLY_APART;
 
-	if (chain == 0) {
-		t->dense[element_side] += w;
-		t->replicate[ps] += w;
-		t->seen[ps >> 6] |= (uint64_t)1 << (ps & 63);
-	} else {
-		const uint32_t *start = t->m->patch_start;
-		uint64_t place = 2 * (uint64_t)start[p] + (element - start[p]) +
-		                 (side ? start[p + 1] - start[p] : 0);
-		struct tally_far f = { slot_of(t, chain) * 2 * (uint64_t)t->m->elements + place,
-		                       element_side, w };
-		vec_append(&t->far, &f, 1, sizeof f, &t->err);
-		if (t->far.n >= t->far_most) {
-			merge_far(t, &t->err);
-			t->far_most = t->far.n > FAR_MOST / 2 ? 2 * t->far.n : FAR_MOST;
-		}
-	}
-	if (t->has_lobe[ps])
+	if (chain)
+		hit_far(t, chain, place, element_side, w);
+	else
+		hit_near(t, place, ps, w);
+	if (!t->has_lobe[ps])
+		return;
+	if (chain)
 		note_arrival(t, chain, ps, w, dir);
+	else
+		v3_mad(t->toward[ps], -w, dir, t->toward[ps]);
+}
+
+/* The first place seen at or after `place`, or UINT32_MAX. */
+static uint32_t next_seen(const struct tally *t, uint64_t place)
+{
+	if (place >> 12 >= t->words)
+		return UINT32_MAX;
+	uint64_t bits = t->seen[place >> 6] >> (place & 63);
+	if (bits)
+		return (uint32_t)(place + (uint64_t)__builtin_ctzll(bits));
+	uint64_t word = (place >> 6) + 1;
+	bits = word & 63 ? t->words_seen[word >> 6] >> (word & 63) : 0;
+	if (!bits) {
+		for (word = (word + 63) & ~(uint64_t)63; word >> 6 < t->words; word += 64)
+			if ((bits = t->words_seen[word >> 6]))
+				break;
+		if (!bits)
+			return UINT32_MAX;
+	}
+	word += (uint64_t)__builtin_ctzll(bits);
+	return (uint32_t)(64 * word + (uint64_t)__builtin_ctzll(t->seen[word]));
+}
+
+static uint32_t side_at(const struct tally *t, uint32_t place)
+{
+	uint32_t column = t->places->column[place];
+
+	return 2 * t->m->element_patch[column >> 1] + (column & 1);
+}
+
+/* The place after a patch-side's last. */
+static uint32_t side_end(const struct tally *t, uint32_t ps)
+{
+	const uint32_t *start = &t->m->patch_start[ps >> 1];
+
+	return ps & 1 ? 2 * start[1] : start[0] + start[1];
 }
 
 void tally_replicate(struct tally *t)
 {
 	double escape = tally_rest(t, 0)->escape, now = escape - t->escape_before;
+	uint32_t place = next_seen(t, 0);
 
-	for (size_t word = 0; word < t->words; word++)
-		for (uint64_t left = t->seen[word]; left; left &= left - 1) {
-			size_t ps = 64 * word + (size_t)__builtin_ctzll(left);
-			t->square[ps] += t->replicate[ps] * t->replicate[ps];
-			t->replicate[ps] = 0;
-		}
+	while (t->weighed && place != UINT32_MAX) {
+		uint32_t ps = side_at(t, place);
+		t->square[ps] += t->replicate[ps] * t->replicate[ps];
+		t->replicate[ps] = 0;
+		place = next_seen(t, side_end(t, ps));
+	}
 	t->escape_square += now * now;
 	t->escape_before = escape;
 	t->replicates++;
@@ -212,36 +304,70 @@ static double share_variance(const struct tally *t, double sum, double square, d
 	return f * (1 - f) / samples;
 }
 
-/* Chain 0 on one patch-side: entries for the elements that were hit. Clears them. */
-static int finish_side(struct tally *t, struct ff_batch *b, uint32_t ps, uint32_t samples,
-                       double total, double *sum, double *variance, struct err *e)
+static int put_arrival(struct ff_batch *b, uint32_t target, const double toward[3],
+                       struct err *e)
 {
-	const uint32_t *start = &t->m->patch_start[ps >> 1];
-	double patch_sum = 0;
+	double l = v3_length(toward);
+	float f[3] = { 0, 0, 1 };
 
-	if (reserve(b, start[1] - start[0], e))
-		return -1;
-	for (uint32_t el = start[0]; el < start[1]; el++) {
-		double *w = &t->dense[2 * (size_t)el + (ps & 1)];
-		if (*w > 0)
-			*sum += put_value(b, 2 * el + (ps & 1), *w);
-		patch_sum += *w;
-		*w = 0;
-	}
-	*variance += share_variance(t, patch_sum, t->square[ps], total, samples);
-	t->square[ps] = t->replicate[ps] = 0;
-	return 0;
+	for (int k = 0; k < 3 && l > 0; k++)
+		f[k] = (float)(toward[k] / l);
+	return vec_append(&b->arrival_target, &target, 1, sizeof target, e) ||
+	       vec_append(&b->arrival_direction, f, 3, sizeof *f, e) ? -1 : 0;
 }
 
-static int finish_near(struct tally *t, struct ff_batch *b, uint32_t samples, double total,
-                       double *sum, double *variance, struct err *e)
+/* What a row adds up to. */
+struct finish {
+	uint32_t samples;
+	double total, sum, variance;
+};
+
+/* Chain 0 on one patch-side: entries for the elements that were hit, from `place` on.
+ * Clears them. */
+static int finish_side(struct tally *t, struct ff_batch *b, uint32_t ps, uint32_t place,
+                       struct finish *f, struct err *e)
 {
+	uint32_t end = side_end(t, ps);
+	double part[TALLY_REPLICATES] = { 0 }, side_sum = 0, square = t->square[ps];
+
+	if (reserve(b, end - place, e))
+		return -1;
+	for (; place < end; place = next_seen(t, (uint64_t)place + 1)) {
+		double w = t->dense[place];
+		for (int r = 0; r < TALLY_REPLICATES; r++) {
+			w += t->count[place][r];
+			part[r] += t->count[place][r];
+		}
+		f->sum += put_value(b, t->places->column[place], w);
+		side_sum += w;
+		t->dense[place] = 0;
+		memset(t->count[place], 0, sizeof t->count[place]);
+	}
+	for (int r = 0; r < TALLY_REPLICATES; r++)
+		square += part[r] * part[r];
+	f->variance += share_variance(t, side_sum, square, f->total, f->samples);
+	t->square[ps] = t->replicate[ps] = 0;
+	if (!t->has_lobe[ps])
+		return 0;
+	int bad = put_arrival(b, ps, t->toward[ps], e);
+	memset(t->toward[ps], 0, sizeof t->toward[ps]);
+	return bad;
+}
+
+static int finish_near(struct tally *t, struct ff_batch *b, struct finish *f, struct err *e)
+{
+	uint32_t place = next_seen(t, 0);
+
+	while (place != UINT32_MAX) {
+		uint32_t ps = side_at(t, place);
+		if (finish_side(t, b, ps, place, f, e))
+			return -1;
+		place = next_seen(t, side_end(t, ps));
+	}
 	for (size_t word = 0; word < t->words; word++) {
-		for (uint64_t left = t->seen[word]; left; left &= left - 1)
-			if (finish_side(t, b, (uint32_t)(64 * word) + (uint32_t)__builtin_ctzll(left),
-			                samples, total, sum, variance, e))
-				return -1;
-		t->seen[word] = 0;
+		for (uint64_t left = t->words_seen[word]; left; left &= left - 1)
+			t->seen[64 * word + (size_t)__builtin_ctzll(left)] = 0;
+		t->words_seen[word] = 0;
 	}
 	return 0;
 }
@@ -254,7 +380,7 @@ static int by_target(const void *a, const void *b)
 	return (x->target > y->target) - (x->target < y->target);
 }
 
-/* Appends the mean directions of one slot's arrivals, which are sorted by slot
+/* Appends the mean directions of a longer chain's arrivals, which are sorted by slot
  * and target. */
 static int put_arrivals(struct tally *t, struct ff_batch *b, uint32_t slot, struct err *e)
 {
@@ -270,16 +396,10 @@ static int put_arrivals(struct tally *t, struct ff_batch *b, uint32_t slot, stru
 	}
 	while (i < n && a[i].slot == slot) {
 		uint32_t target = a[i].target;
-		double d[3] = { 0 }, l;
+		double d[3] = { 0 };
 		for (; i < n && a[i].slot == slot && a[i].target == target; i++)
-			for (int k = 0; k < 3; k++)
-				d[k] += a[i].dir[k];
-		l = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-		float f[3] = { 0, 0, 1 };
-		for (int k = 0; k < 3 && l > 0; k++)
-			f[k] = (float)(d[k] / l);
-		if (vec_append(&b->arrival_target, &target, 1, sizeof target, e) ||
-		    vec_append(&b->arrival_direction, f, 3, sizeof *f, e))
+			v3_mad(d, 1, a[i].dir, d);
+		if (put_arrival(b, target, d, e))
 			return -1;
 	}
 	return 0;
@@ -369,7 +489,7 @@ static void clear(struct tally *t)
 		((uint32_t *)t->chain_slot.data)[chain[s]] = 0;
 	t->slot_chain.n = t->rest.n = t->far.n = t->arrival.n = 0;
 	t->escape_before = t->escape_square = 0;
-	t->replicates = 0;
+	t->replicates = t->weighed = 0;
 	slot_of(t, 0);
 }
 
@@ -404,21 +524,21 @@ int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
                  enum ff_row_kind kind, uint32_t samples, double total, struct err *e)
 {
 	struct tally_rest *r = tally_rest(t, 0);
-	double sum = 0, variance = 0;
+	struct finish f = { .samples = samples, .total = total };
 
 	if (t->err.set)
 		return err_set(e, "%s", t->err.text);
-	if (put_zero_starts(b, e) || finish_near(t, b, samples, total, &sum, &variance, e))
+	if (put_zero_starts(b, e) || finish_near(t, b, &f, e))
 		return -1;
-	variance += share_variance(t, r->escape, t->escape_square, total, samples);
-	sum += r->escape + r->black + r->lost + r->cut;
+	f.variance += share_variance(t, r->escape, t->escape_square, total, samples);
+	f.sum += r->escape + r->black + r->lost + r->cut;
 	if (t->arrival.n)
 		qsort(t->arrival.data, t->arrival.n, sizeof(struct tally_arrival), by_target);
 	if (put_block(t, b, 0, e) || finish_far(t, b, e))
 		return -1;
 	clear(t);
-	return put_row(b, row_side, kind, samples, sum > 0 ? 1 / sum : 0, 1 - sum / total,
-	               sqrt(variance), e);
+	return put_row(b, row_side, kind, samples, f.sum > 0 ? 1 / f.sum : 0, 1 - f.sum / total,
+	               sqrt(f.variance), e);
 }
 
 /* ---- batches ---- */
