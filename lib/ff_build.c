@@ -50,9 +50,6 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 static int job_arrays(struct ff_job *j, struct err *e)
 {
 	size_t sides = 2 * j->m->patches;
-	uint64_t n = (uint64_t)j->o.rays * j->o.emitter_gain / FF_REPLICATES;
-
-	j->sobol_points = n < SOBOL_POINTS_MAX ? (uint32_t)n : SOBOL_POINTS_MAX;
 	j->element = mem_new(j->m->elements, sizeof *j->element, "sampling tables", e);
 	j->shoots_diffuse = mem_new(sides, 1, "patch flags", e);
 	j->shoots_lobe = mem_new(sides, 1, "patch flags", e);
@@ -61,9 +58,8 @@ static int job_arrays(struct ff_job *j, struct err *e)
 	j->is_source = mem_new(sides, 1, "patch flags", e);
 	j->is_black = mem_new(sides, 1, "patch flags", e);
 	j->is_ideal = mem_new(sides, 1, "patch flags", e);
-	j->sobol = mem_new((size_t)j->sobol_points * FF_DIMS, sizeof *j->sobol, "sample points", e);
 	return j->element && j->shoots_diffuse && j->shoots_lobe && j->has_lobe && j->emits &&
-	       j->is_source && j->is_black && j->is_ideal && j->sobol ? 0 : -1;
+	       j->is_source && j->is_black && j->is_ideal ? 0 : -1;
 }
 
 /* Bits of x spread to the even places. */
@@ -91,26 +87,38 @@ static int by_direction(const void *a, const void *b)
 	return (p > q) - (p < q);
 }
 
-/* The sample points, each aligned block of a power of two in an order in which
- * neighbours have similar directions (their places on a Morton curve, which scrambling
- * keeps): rays and memory then see coherent work. A replicate is whole blocks. */
-static int fill_samples(struct ff_job *j, struct err *e)
+/* The first n sample points, each aligned block of a power of two that divides `each` in
+ * an order in which neighbours have similar directions (their places on a Morton curve,
+ * which scrambling keeps): rays and memory then see coherent work. */
+static int fill_samples(struct ff_samples *s, uint32_t each, uint64_t n, struct err *e)
 {
-	uint32_t each = j->o.rays / FF_REPLICATES, block = each & (~each + 1), n = j->sobol_points;
-	struct sample *sample = mem_new(n, sizeof *sample, "sample points", e);
+	uint32_t block = each & (~each + 1);
 
-	if (!sample)
-		return -1;
-	for (uint32_t i = 0; i < n; i++)
+	s->n = n < SOBOL_POINTS_MAX ? (uint32_t)n : SOBOL_POINTS_MAX;
+	s->bits = mem_new((size_t)s->n * FF_DIMS, sizeof *s->bits, "sample points", e);
+	struct sample *sample = mem_new(s->n, sizeof *sample, "sample points", e);
+	for (uint32_t i = 0; s->bits && sample && i < s->n; i++)
 		for (int d = 0; d < FF_DIMS; d++)
 			sample[i].bits[d] = rng_sobol_bits(i, d);
-	for (uint32_t i = 0; j->o.method == FF_RAYS && block && i + block <= n; i += block)
+	for (uint32_t i = 0; s->bits && sample && block && i + block <= s->n; i += block)
 		qsort(sample + i, block, sizeof *sample, by_direction);
-	for (uint32_t i = 0; i < n; i++)
+	for (uint32_t i = 0; s->bits && sample && i < s->n; i++)
 		for (uint32_t d = 0; d < FF_DIMS; d++)
-			j->sobol[(size_t)d * n + i] = sample[i].bits[d];
+			s->bits[(size_t)d * s->n + i] = sample[i].bits[d];
 	free(sample);
-	return 0;
+	return s->bits && sample ? 0 : -1;
+}
+
+/* A replicate is whole blocks of the rows' points, an element-side's rays are of the
+ * gathering ones. */
+static int make_samples(struct ff_job *j, struct err *e)
+{
+	uint32_t each = j->o.rays / FF_REPLICATES, gather = j->o.gather;
+
+	if (j->o.method != FF_RAYS)
+		return 0;
+	return fill_samples(&j->of_rows, each, (uint64_t)each * j->o.emitter_gain, e) ||
+	       fill_samples(&j->of_gathering, gather, gather, e) ? -1 : 0;
 }
 
 /* A ray that lands on some sides has more to it than where it lands. */
@@ -139,18 +147,20 @@ static int job_init(struct ff_job *j, const struct model *m, const struct ff_opt
 	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
 		side_flags(j, ps);
 	ff_element_table(j);
-	return fill_samples(j, e) || make_places(j, e) ? -1 : 0;
+	return make_samples(j, e) || make_places(j, e) ? -1 : 0;
 }
 
 static void job_free(struct ff_job *j)
 {
 	void *array[] = { j->element, j->shoots_diffuse, j->shoots_lobe, j->has_lobe,
-		j->is_source, j->emits, j->is_ideal, j->is_black, j->sobol };
+		j->is_source, j->emits, j->is_ideal, j->is_black, j->of_rows.bits,
+		j->of_gathering.bits };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
 	locator_free(&j->locator);
 	tally_places_free(&j->places);
+	ff_gather_free(&j->gather);
 	ray_scene_free(j->rays);
 	hemi_scene_free(j->cubes);
 	hemi_grid_free(&j->grid);
@@ -174,6 +184,7 @@ static void thread_free(struct ff_thread *t)
 	tally_free(&t->tally);
 	hemicube_free(&t->cube);
 	free(t->captures.data);
+	free(t->sights.data);
 	free(t->item);
 	free(t->view);
 	free(t->chain_map.data);
@@ -326,6 +337,7 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 		bad = thread_init(&run.thread[t], &job, e);
 	for (size_t i = 0; !bad && i < PATCHES_AT_A_TIME; i++)
 		run.batch[i].f64 = o->f64;
+	bad = bad || (o->gather && o->method == FF_RAYS && ff_gather(&job, &stats->rays, e));
 	bad = bad || all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats,
 	                         sink, progress, e) || put_chains(whole, &chains, e);
 	for (int t = 0; run.thread && t < threads; t++) {

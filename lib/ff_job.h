@@ -9,7 +9,7 @@
 #include "ray.h"
 #include "rng.h"
 
-enum { FF_REPLICATES = 4, FF_DIMS = 5 };
+enum { FF_REPLICATES = 4, FF_DIMS = 4 };
 
 /* An element as a place to send rays from. Points are corner + w1 edge[0] + w2 edge[1],
  * with weights that keep a little clear of the edges. Threes are padded to four. */
@@ -20,6 +20,28 @@ struct ff_element {
 	double per_area;
 	uint32_t before;          /* 2^32 times the part of the patch's area before it */
 	float per_part;           /* 1 / the same of its own area */
+};
+
+/* The first points of the Sobol sequence, in an order in which neighbours have similar
+ * directions; beyond them points follow as they are. */
+struct ff_samples {
+	uint32_t n;
+	uint32_t *bits;           /* [FF_DIMS][n] */
+};
+
+/* What elements saw: hits of their rays on each patch-side that shoots. */
+struct ff_gathered {
+	uint32_t column, count;   /* element-side, its rays that landed here */
+};
+
+struct ff_gather {
+	uint32_t rays;            /* from an element-side; 0: nothing was gathered */
+	int alone;                /* rows tell of nothing but diffuse landings */
+	uint64_t *start;          /* [2P+1] of a patch-side, ordered by place */
+	struct ff_gathered *seen;
+	double (*centre)[4];      /* [P] of a patch, and the distance of its farthest vertex */
+	double *escape, *black;   /* [2P] parts of what leaves a patch-side, the same rays
+	                             taken as its own */
 };
 
 /* Shared, read-only while rows are computed. */
@@ -38,9 +60,9 @@ struct ff_job {
 	uint8_t *has_lobe;        /* [2P] light arriving here leaves by a finite lobe */
 	uint8_t *emits;           /* [2P] gives light of its own */
 	uint8_t *is_source;       /* [2P] any light leaves here */
-	uint32_t *sobol;          /* [FF_DIMS][sobol_points] bits */
-	uint32_t sobol_points;
+	struct ff_samples of_rows, of_gathering;
 	struct tally_places places;
+	struct ff_gather gather;
 };
 
 /* A way that light can come to a directional patch-side: sampled backwards. */
@@ -79,6 +101,7 @@ struct ff_thread {
 	uint32_t *item;           /* hemicube: [points][2 sides][pixels] of the patch */
 	struct view *view;        /* hemicube: [points][2 sides] */
 	double rays;
+	struct vec sights;        /* struct ff_sight */
 	struct ff_batch_rays lobe; /* lobe rays waiting to be cast */
 	uint32_t lobes;
 	struct vec chain_map;     /* local -> whole */
@@ -92,7 +115,7 @@ void ff_element_table(struct ff_job *j);
 uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, double x[3]);
 
 /* The numbers of rays first to first + n (n <= RAY_BATCH) of a scrambled replicate. */
-void ff_batch_numbers(const struct ff_job *j, const uint32_t seed[4], uint32_t first,
+void ff_batch_numbers(const struct ff_samples *s, const uint32_t seed[4], uint32_t first,
                       uint32_t n, struct ff_batch_rays *b);
 
 /* Elements of a patch for the rays, by area; u[0] becomes what is left of the choice. */
@@ -117,6 +140,37 @@ void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], do
 
 /* The same for a ray of chain 0 whose first landing has been tallied already. */
 void ff_follow_on(struct ff_thread *t, const double org[3], const double dir[3], double w);
+
+/* Casts o.gather rays from every element-side that is modelled and no ideal mirror or
+ * pane, jointly stratified over its area and hemisphere, into j->gather; adds to *rays.
+ * Memory: 16 bytes for every pair of an element-side and a patch-side that it sees.
+ * O(element-sides x rays x log triangles). 0, or -1 and e. */
+int ff_gather(struct ff_job *j, double *rays, struct err *e);
+void ff_gather_free(struct ff_gather *g);
+
+/* 1 if enough was gathered of a patch-side to make its row of. */
+int ff_is_gathered(const struct ff_job *j, uint32_t patch_side);
+
+/* A row of direct sight: t->sights becomes F[source -> element-side] of every
+ * element-side that may see the source, with about `rays` rays between them. Returns
+ * their sum. O(elements + rays). */
+struct ff_sight {
+	uint32_t column;
+	double w, variance;
+};
+double ff_see(struct ff_thread *t, uint32_t source, uint32_t rays, struct err *e);
+
+/* What a row's weights are counted in. */
+struct ff_weight {
+	uint32_t samples;         /* behind the row */
+	double total;
+};
+
+/* Lets what was gathered, or seen (for emitters), decide where the light of patch-side ps
+ * lands: of what the `cast` rays of its own, tallied already, brought to any element, or
+ * (cast = 0) of all that neither escapes nor meets a black side. 1 if it did, else the
+ * tally is left alone. */
+int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_weight *w);
 
 /* All rows of one patch into the batch. 0, or -1 and e. */
 int ff_patch_rays(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);

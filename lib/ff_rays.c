@@ -276,7 +276,7 @@ static void cast(struct ff_thread *t, uint32_t ps, uint32_t count, double expone
 		struct scramble s = scramble(j, 2 * ps + (exponent >= 0), r);
 		for (uint32_t first = 0; first < each; first += RAY_BATCH) {
 			uint32_t n = each - first < RAY_BATCH ? each - first : RAY_BATCH;
-			ff_batch_numbers(j, s.seed, first, n, &b);
+			ff_batch_numbers(&j->of_rows, s.seed, first, n, &b);
 			ff_batch_elements(j, ps >> 1, n, &b);
 			ff_batch_origins(j, (int)(ps & 1), n, &b);
 			if (exponent < 0)
@@ -317,6 +317,27 @@ static void cast_lobe_ray(struct ff_thread *t, const struct capture *c, int side
 		ff_lobes_cast(t);
 }
 
+/* The diffuse row of a patch-side into the tally: its own rays, where it needs them, and
+ * what was gathered of it, where that is better. */
+static struct ff_weight diffuse(struct ff_thread *t, uint32_t ps)
+{
+	const struct ff_job *j = t->job;
+	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
+	struct ff_weight w = { rays, rays };
+	int gathered = j->gather.rays && j->shoots_diffuse[ps] &&
+	               (j->emits[ps] || ff_is_gathered(j, ps));
+
+	if (gathered && j->gather.alone && ff_redistribute(t, ps, 0, &w))
+		return w;
+	t->capturing = j->has_lobe[ps];
+	t->capture_weight = 1;
+	cast(t, ps, rays, -1);
+	t->capturing = 0;
+	if (gathered && !j->gather.alone)
+		ff_redistribute(t, ps, rays, &w);
+	return w;
+}
+
 static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struct err *e)
 {
 	const struct ff_job *j = t->job;
@@ -326,13 +347,10 @@ static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struc
 	t->rng = rng_seed(j->o.seed, ps);
 	t->captures.n = 0;
 	if (j->shoots_diffuse[ps] || j->has_lobe[ps]) {
-		t->capturing = j->has_lobe[ps];
-		t->capture_weight = 1;
-		cast(t, ps, rays, -1);
-		t->capturing = 0;
+		struct ff_weight w = diffuse(t, ps);
 		struct ff_batch unused = { 0 };
 		if (tally_finish(&t->tally, j->shoots_diffuse[ps] ? b : &unused, ps, FF_DIFFUSE,
-		                 rays, rays, e))
+		                 w.samples, w.total, e))
 			return -1;
 		batch_free(&unused);
 	}

@@ -87,15 +87,16 @@ uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, 
 	return i;
 }
 
-void ff_batch_numbers(const struct ff_job *j, const uint32_t seed[4], uint32_t first,
+void ff_batch_numbers(const struct ff_samples *s, const uint32_t seed[4], uint32_t first,
                       uint32_t n, struct ff_batch_rays *b)
 {
 	uint32_t bits[RAY_BATCH] = { 0 };
 
 	for (int d = 0; d < 4; d++) {
-		uint32_t known = first < j->sobol_points ? j->sobol_points - first : 0;
+		uint32_t known = first < s->n ? s->n - first : 0;
 		known = known < n ? known : n;
-		memcpy(bits, &j->sobol[(size_t)d * j->sobol_points + first], known * sizeof *bits);
+		if (known)
+			memcpy(bits, &s->bits[(size_t)d * s->n + first], known * sizeof *bits);
 		for (uint32_t i = known; i < n; i++)
 			bits[i] = rng_sobol_bits(first + i, d);
 		for (int i = 0; i < RAY_BATCH; i++)

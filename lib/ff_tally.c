@@ -84,9 +84,10 @@ int tally_init(struct tally *t, const struct model *m, const struct tally_places
 	t->words_seen = mem_new(t->words, sizeof *t->words_seen, "row tally", e);
 	t->replicate = mem_new(2 * m->patches, sizeof *t->replicate, "row tally", e);
 	t->square = mem_new(2 * m->patches, sizeof *t->square, "row tally", e);
+	t->variance = mem_new(2 * m->patches, sizeof *t->variance, "row tally", e);
 	t->toward = mem_new(2 * m->patches, sizeof *t->toward, "row tally", e);
 	if (!t->count || !t->dense || !t->seen || !t->words_seen || !t->replicate ||
-	    !t->square || !t->toward)
+	    !t->square || !t->variance || !t->toward)
 		return -1;
 	slot_of(t, 0); /* chain 0 is slot 0 of every row */
 	return t->err.set ? err_set(e, "%s", t->err.text) : 0;
@@ -95,7 +96,7 @@ int tally_init(struct tally *t, const struct model *m, const struct tally_places
 void tally_free(struct tally *t)
 {
 	void *array[] = { t->count, t->dense, t->seen, t->words_seen, t->replicate,
-		t->square, t->toward, t->far.data, t->sort.data, t->rest.data, t->slot_chain.data,
+		t->square, t->variance, t->toward, t->far.data, t->sort.data, t->rest.data, t->slot_chain.data,
 		t->chain_slot.data, t->arrival.data };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
@@ -187,8 +188,7 @@ static void hit_near(struct tally *t, uint32_t place, uint32_t ps, double w)
 	t->weighed = 1;
 	t->dense[place] += w;
 	t->replicate[ps] += w;
-	t->seen[place >> 6] |= (uint64_t)1 << (place & 63);
-	t->words_seen[place >> 12] |= (uint64_t)1 << (place >> 6 & 63);
+	tally_see(t, place);
 }
 
 static void hit_far(struct tally *t, uint32_t chain, uint32_t place, uint32_t element_side,
@@ -222,8 +222,7 @@ void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
 		v3_mad(t->toward[ps], -w, dir, t->toward[ps]);
 }
 
-/* The first place seen at or after `place`, or UINT32_MAX. */
-static uint32_t next_seen(const struct tally *t, uint64_t place)
+uint32_t tally_next(const struct tally *t, uint64_t place)
 {
 	if (place >> 12 >= t->words)
 		return UINT32_MAX;
@@ -243,15 +242,31 @@ static uint32_t next_seen(const struct tally *t, uint64_t place)
 	return (uint32_t)(64 * word + (uint64_t)__builtin_ctzll(t->seen[word]));
 }
 
-static uint32_t side_at(const struct tally *t, uint32_t place)
+double tally_counted(const struct tally *t, uint32_t place)
+{
+	double n = 0;
+
+	for (int r = 0; r < TALLY_REPLICATES; r++)
+		n += t->count[place][r];
+	return n;
+}
+
+void tally_set(struct tally *t, uint32_t place, double w, double variance)
+{
+	memset(t->count[place], 0, sizeof t->count[place]);
+	t->dense[place] = w;
+	t->variance[tally_side_at(t, place)] += variance;
+	tally_see(t, place);
+}
+
+uint32_t tally_side_at(const struct tally *t, uint32_t place)
 {
 	uint32_t column = t->places->column[place];
 
 	return 2 * t->m->element_patch[column >> 1] + (column & 1);
 }
 
-/* The place after a patch-side's last. */
-static uint32_t side_end(const struct tally *t, uint32_t ps)
+uint32_t tally_side_end(const struct tally *t, uint32_t ps)
 {
 	const uint32_t *start = &t->m->patch_start[ps >> 1];
 
@@ -261,13 +276,13 @@ static uint32_t side_end(const struct tally *t, uint32_t ps)
 void tally_replicate(struct tally *t)
 {
 	double escape = tally_rest(t, 0)->escape, now = escape - t->escape_before;
-	uint32_t place = next_seen(t, 0);
+	uint32_t place = tally_next(t, 0);
 
 	while (t->weighed && place != UINT32_MAX) {
-		uint32_t ps = side_at(t, place);
+		uint32_t ps = tally_side_at(t, place);
 		t->square[ps] += t->replicate[ps] * t->replicate[ps];
 		t->replicate[ps] = 0;
-		place = next_seen(t, side_end(t, ps));
+		place = tally_next(t, tally_side_end(t, ps));
 	}
 	t->escape_square += now * now;
 	t->escape_before = escape;
@@ -327,26 +342,26 @@ struct finish {
 static int finish_side(struct tally *t, struct ff_batch *b, uint32_t ps, uint32_t place,
                        struct finish *f, struct err *e)
 {
-	uint32_t end = side_end(t, ps);
+	uint32_t end = tally_side_end(t, ps);
 	double part[TALLY_REPLICATES] = { 0 }, side_sum = 0, square = t->square[ps];
 
 	if (reserve(b, end - place, e))
 		return -1;
-	for (; place < end; place = next_seen(t, (uint64_t)place + 1)) {
-		double w = t->dense[place];
-		for (int r = 0; r < TALLY_REPLICATES; r++) {
-			w += t->count[place][r];
+	for (; place < end; place = tally_next(t, (uint64_t)place + 1)) {
+		double w = t->dense[place] + tally_counted(t, place);
+		for (int r = 0; r < TALLY_REPLICATES; r++)
 			part[r] += t->count[place][r];
-		}
-		f->sum += put_value(b, t->places->column[place], w);
+		if (w > 0)
+			f->sum += put_value(b, t->places->column[place], w);
 		side_sum += w;
 		t->dense[place] = 0;
 		memset(t->count[place], 0, sizeof t->count[place]);
 	}
 	for (int r = 0; r < TALLY_REPLICATES; r++)
 		square += part[r] * part[r];
-	f->variance += share_variance(t, side_sum, square, f->total, f->samples);
-	t->square[ps] = t->replicate[ps] = 0;
+	f->variance += t->variance[ps] > 0 ? t->variance[ps] / (f->total * f->total)
+	             : share_variance(t, side_sum, square, f->total, f->samples);
+	t->square[ps] = t->replicate[ps] = t->variance[ps] = 0;
 	if (!t->has_lobe[ps])
 		return 0;
 	int bad = put_arrival(b, ps, t->toward[ps], e);
@@ -356,13 +371,13 @@ static int finish_side(struct tally *t, struct ff_batch *b, uint32_t ps, uint32_
 
 static int finish_near(struct tally *t, struct ff_batch *b, struct finish *f, struct err *e)
 {
-	uint32_t place = next_seen(t, 0);
+	uint32_t place = tally_next(t, 0);
 
 	while (place != UINT32_MAX) {
-		uint32_t ps = side_at(t, place);
+		uint32_t ps = tally_side_at(t, place);
 		if (finish_side(t, b, ps, place, f, e))
 			return -1;
-		place = next_seen(t, side_end(t, ps));
+		place = tally_next(t, tally_side_end(t, ps));
 	}
 	for (size_t word = 0; word < t->words; word++) {
 		for (uint64_t left = t->words_seen[word]; left; left &= left - 1)

@@ -38,6 +38,7 @@ struct tally {
 	int weighed;               /* any other weights */
 	double *replicate;         /* [2P] other weights, the current replicate */
 	double *square;            /* [2P] their sums of squares over replicates */
+	double *variance;          /* [2P] of the summed weight, where tally_set gave it */
 	double (*toward)[3];       /* [2P] summed directions to where light comes from */
 	double escape_before, escape_square;
 	int replicates;
@@ -72,14 +73,19 @@ int tally_init(struct tally *t, const struct model *m, const struct tally_places
                const uint8_t *has_lobe, struct err *e);
 void tally_free(struct tally *t);
 
+static inline void tally_see(struct tally *t, uint32_t place)
+{
+	t->seen[place >> 6] |= (uint64_t)1 << (place & 63);
+	t->words_seen[place >> 12] |= (uint64_t)1 << (place >> 6 & 63);
+}
+
 /* A landing of weight 1 by chain 0 at a place without a lobe. */
 static inline void tally_count(struct tally *t, uint32_t place)
 {
 	int r = t->replicates < TALLY_REPLICATES ? t->replicates : TALLY_REPLICATES - 1;
 
 	t->count[place][r]++;
-	t->seen[place >> 6] |= (uint64_t)1 << (place & 63);
-	t->words_seen[place >> 12] |= (uint64_t)1 << (place >> 6 & 63);
+	tally_see(t, place);
 }
 
 /* Weight w of the row's flux arriving by `chain` on an element-side, travelling
@@ -90,6 +96,18 @@ void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
 /* What became of flux of `chain` that lands nowhere. The pointer is good until
  * the next call with a chain not seen in this row. */
 struct tally_rest *tally_rest(struct tally *t, uint32_t chain);
+
+/* The first place seen in chain 0 at or after `place`, or UINT32_MAX; the patch-side of
+ * a place, and the place after its last. */
+uint32_t tally_next(const struct tally *t, uint64_t place);
+uint32_t tally_side_at(const struct tally *t, uint32_t place);
+uint32_t tally_side_end(const struct tally *t, uint32_t patch_side);
+
+/* Landings of weight 1 tallied at a place. */
+double tally_counted(const struct tally *t, uint32_t place);
+
+/* Makes w, of that variance, the weight at a place in chain 0. */
+void tally_set(struct tally *t, uint32_t place, double w, double variance);
 
 /* Closes a replicate: equal, independently scrambled parts of a row's samples,
  * whose spread gives the row's standard error. */

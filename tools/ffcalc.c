@@ -13,7 +13,7 @@
 #include "../lib/ff_build.h"
 #include "common/cli.h"
 
-enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GAIN };
+enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GAIN, OPT_GATHER };
 
 static const struct cli_option options[] = {
 	{ 'o', "output", "FILE", "write the form factors to FILE (.ff)" },
@@ -21,6 +21,7 @@ static const struct cli_option options[] = {
 	{ 'n', "samples", "N", "rays a patch-side (default 4096), or pixels along a hemicube's edge (64)" },
 	{ 'p', "points", "N", "hemicubes a patch-side (default 16)" },
 	{ OPT_GAIN, "emitter-gain", "N", "times as many rays for emitters (default 8)" },
+	{ OPT_GATHER, "gather", "N", "rays that each side of an element gathers with (default 0)" },
 	{ OPT_LOBE_RAYS, "lobe-rays", "N", "rays a patch-side for each directional lobe (default 4096)" },
 	{ OPT_DEPTH, "depth", "N", "most ideal mirrors and panes a ray is followed through (default 256)" },
 	{ OPT_PRECISION, "precision", "TYPE", "f32 or f64 (default f32)" },
@@ -68,6 +69,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		case 'n': n = cli_integer(c, "--samples", optarg, 4, 1 << 26); break;
 		case 'p': o->points = (uint32_t)cli_integer(c, "--points", optarg, 1, 4096); break;
 		case OPT_GAIN: o->emitter_gain = (uint32_t)cli_integer(c, "--emitter-gain", optarg, 1, 4096); break;
+		case OPT_GATHER: o->gather = (uint32_t)cli_integer(c, "--gather", optarg, 0, 1 << 20); break;
 		case OPT_LOBE_RAYS: o->lobe_rays = (uint32_t)cli_integer(c, "--lobe-rays", optarg, 1, 1 << 26); break;
 		case OPT_DEPTH: o->depth = (uint32_t)cli_integer(c, "--depth", optarg, 0, 1000000); break;
 		case OPT_PRECISION: parse_word(c, "--precision", optarg, "f64", "f32", &o->f64); break;
@@ -98,6 +100,7 @@ static json_t *options_json(const struct ff_options *o)
 		"precision", o->f64 ? "f64" : "f32",
 		"part", (json_int_t)o->part, "parts", (json_int_t)o->parts);
 
+	json_object_set_new(j, "gather", json_integer(o->gather));
 	json_object_set_new(j, "emitter_gain", json_integer(o->emitter_gain));
 	if (o->method == FF_HEMICUBE)
 		json_object_set_new(j, "points", json_integer(o->points));
