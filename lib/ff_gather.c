@@ -10,13 +10,14 @@
 #include "mem.h"
 #include "vec3.h"
 
-/* A row is made of what was gathered if that is so much of the rays it would cast: what
- * is larger than the elements around it is seen by many. */
-static const double enough = .27;
+/* An element's own rays tell what a patch-side sends it, if its area is small beside the
+ * patch's, and if of rays between them so many are the element's, beside those that the
+ * row casts: they are stratified over all that the element sees, so fewer do. A large
+ * element is better told by the rays of a small patch. */
+static const double larger = 2.2, enough = .11;
 
-/* How far the sum of such a row may be from what must land; beyond it the rays that
- * would have met a small or close surface were too few. */
-static const double misfit = .2;
+/* How far the sum of gathered factors may be from what must land there. */
+static const double misfit = .25;
 
 struct gatherer {
 	const struct ff_job *job;
@@ -223,17 +224,27 @@ void ff_gather_free(struct ff_gather *g)
 
 /* ---- rows of what was gathered ---- */
 
-int ff_is_gathered(const struct ff_job *j, uint32_t ps)
+static int takes(const struct ff_job *j, uint32_t ps, uint32_t column)
 {
-	uint64_t hits = 0;
+	double area = j->m->patch_area[ps >> 1], element = j->m->element_area[column >> 1];
 
-	for (uint64_t i = j->gather.start[ps]; i < j->gather.start[ps + 1]; i++)
-		hits += j->gather.seen[i].count;
-	return (double)hits >= enough * j->o.rays;
+	return area >= larger * element && j->gather.rays * area >= enough * j->o.rays * element;
+}
+
+int ff_row_is_gathered(const struct ff_job *j, uint32_t ps)
+{
+	const struct ff_gather *g = &j->gather;
+	uint64_t i = g->start[ps], end = g->start[ps + 1];
+
+	if (!g->alone || i == end)
+		return 0;
+	while (i < end && takes(j, ps, g->seen[i].column))
+		i++;
+	return i == end;
 }
 
 /* F[ps -> element-side] from what was gathered, as ff_see gives it. */
-static double recall(struct ff_thread *t, uint32_t ps, struct err *e)
+static double recall(struct ff_thread *t, uint32_t ps)
 {
 	const struct ff_job *j = t->job;
 	const struct ff_gather *g = &j->gather;
@@ -243,36 +254,54 @@ static double recall(struct ff_thread *t, uint32_t ps, struct err *e)
 	for (uint64_t i = g->start[ps]; i < g->start[ps + 1]; i++) {
 		double n = g->seen[i].count, one = scale * j->m->element_area[g->seen[i].column >> 1];
 		struct ff_sight s = { g->seen[i].column, one * n, one * one * n * (1 - n / g->rays) };
-		if (vec_append(&t->sights, &s, 1, sizeof s, e))
+		if (!takes(j, ps, s.column))
+			continue;
+		if (vec_append(&t->sights, &s, 1, sizeof s, &t->tally.err))
 			return 0;
 		sum += s.w;
 	}
 	return sum;
 }
 
-/* What must land on elements that are seen: all, less what has been told apart. */
-static double landing(const struct ff_thread *t, uint32_t ps, uint32_t cast)
+/* The next place at or after `place` whose weight the row's own rays do not decide. */
+static uint32_t next_taken(const struct ff_thread *t, uint32_t ps, uint64_t place)
 {
-	const struct tally *y = &t->tally;
-	double sum = 0;
+	const struct ff_job *j = t->job;
+	uint32_t at = tally_next(&t->tally, place);
 
-	if (!cast)
-		return 1 - t->job->gather.escape[ps] - t->job->gather.black[ps];
-	for (uint32_t place = tally_next(y, 0); place != UINT32_MAX;
-	     place = tally_next(y, (uint64_t)place + 1))
-		if (!t->job->is_ideal[tally_side_at(y, place)])
-			sum += tally_counted(y, place);
-	return sum;
+	while (at != UINT32_MAX && (j->is_ideal[tally_side_at(&t->tally, at)] ||
+	                            !(j->emits[ps] || takes(j, ps, j->places.column[at]))))
+		at = tally_next(&t->tally, (uint64_t)at + 1);
+	return at;
 }
 
-static void clear_own(struct ff_thread *t)
+/* The part of the row that its own rays bring to elements whose shares are taken from
+ * elsewhere. */
+static double brought(const struct ff_thread *t, uint32_t ps, uint32_t cast)
 {
-	struct tally *y = &t->tally;
+	double sum = 0;
 
-	for (uint32_t place = tally_next(y, 0); place != UINT32_MAX;
-	     place = tally_next(y, (uint64_t)place + 1))
-		if (!t->job->is_ideal[tally_side_at(y, place)])
-			tally_set(y, place, 0, 0);
+	for (uint32_t place = next_taken(t, ps, 0); place != UINT32_MAX;
+	     place = next_taken(t, ps, (uint64_t)place + 1))
+		sum += tally_counted(&t->tally, place);
+	return sum / cast;
+}
+
+/* The same without rays of its own: what neither escapes nor meets a black side, or the
+ * sum of what elements see, each for as much as it is certain. Books the rest. */
+static double not_lost(struct ff_thread *t, uint32_t ps, double sum, double variance)
+{
+	const struct ff_job *j = t->job;
+	const uint32_t *start = &j->m->patch_start[ps >> 1];
+	double escape = j->gather.escape[ps], black = j->gather.black[ps];
+	double own = escape * (1 - escape) / ((double)j->gather.rays * (start[1] - start[0]));
+	double lands = 1 - escape - black;
+
+	if (own > 0)
+		lands = fmin(1 - black, (lands * variance + sum * own) / (variance + own));
+	tally_rest(&t->tally, 0)->escape = fmax(0, 1 - black - lands);
+	tally_rest(&t->tally, 0)->black = black;
+	return lands;
 }
 
 /* Where no ray of the row's own tells from where light comes to a lobe. */
@@ -284,30 +313,40 @@ static void guess_arrival(struct ff_thread *t, uint32_t ps, uint32_t target)
 		v3_sub(t->job->gather.centre[ps >> 1], t->job->gather.centre[target >> 1], toward);
 }
 
-int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_weight *w)
+/* The sights, scaled, in place of what the row's own rays say of the same elements. */
+static void put_sights(struct ff_thread *t, uint32_t ps, double scale)
 {
 	const struct ff_job *j = t->job;
-	struct err *e = &t->tally.err;
-	uint32_t rays = j->o.rays * j->o.emitter_gain;
-	double sum = j->emits[ps] ? ff_see(t, ps, rays, e) : recall(t, ps, e);
-	double lands = landing(t, ps, cast), total = cast ? cast : 1, hits = 0;
 	const struct ff_sight *s = t->sights.data;
 
-	if (e->set || !(fabs(sum * total - lands) <= misfit * lands))
-		return 0;
-	clear_own(t);
+	for (uint32_t place = next_taken(t, ps, 0); place != UINT32_MAX;
+	     place = next_taken(t, ps, (uint64_t)place + 1))
+		tally_set(&t->tally, place, 0, 0);
 	for (size_t i = 0; i < t->sights.n; i++) {
-		double scale = lands / sum;
 		tally_set(&t->tally, j->places.place[s[i].column] & ~TALLY_APART, scale * s[i].w,
 		          scale * scale * s[i].variance);
 		guess_arrival(t, ps, 2 * j->m->element_patch[s[i].column >> 1] + (s[i].column & 1));
 	}
-	for (uint64_t i = j->gather.start[ps]; i < j->gather.start[ps + 1]; i++)
-		hits += j->gather.seen[i].count;
-	if (!cast) {
-		tally_rest(&t->tally, 0)->escape = j->gather.escape[ps];
-		tally_rest(&t->tally, 0)->black = j->gather.black[ps];
+}
+
+int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_weight *w)
+{
+	const struct ff_job *j = t->job;
+	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
+	double sum = j->emits[ps] ? ff_see(t, ps, rays, &t->tally.err) : recall(t, ps);
+	double variance = 0, total = cast ? cast : 1;
+
+	for (size_t i = 0; i < t->sights.n; i++)
+		variance += ((const struct ff_sight *)t->sights.data)[i].variance;
+	double lands = cast ? brought(t, ps, cast) : not_lost(t, ps, sum, variance);
+	if (t->tally.err.set || !(lands > 0 && sum > 0) ||
+	    fabs(sum - lands) > misfit * lands + 3 * sqrt(lands / rays)) {
+		if (!cast)
+			*tally_rest(&t->tally, 0) = (struct tally_rest){ 0 };
+		return 0;
 	}
-	*w = (struct ff_weight){ (uint32_t)fmin(0xffffffffu, j->emits[ps] ? rays : hits), total };
+	put_sights(t, ps, total * lands / sum);
+	double samples = cast || j->emits[ps] ? rays : sum * sum / variance;
+	*w = (struct ff_weight){ (uint32_t)fmax(1, fmin(rays, samples)), total };
 	return 1;
 }

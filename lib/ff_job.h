@@ -148,8 +148,8 @@ void ff_follow_on(struct ff_thread *t, const double org[3], const double dir[3],
 int ff_gather(struct ff_job *j, double *rays, struct err *e);
 void ff_gather_free(struct ff_gather *g);
 
-/* 1 if enough was gathered of a patch-side to make its row of. */
-int ff_is_gathered(const struct ff_job *j, uint32_t patch_side);
+/* 1 if the row of a patch-side that emits nothing needs no rays of its own. */
+int ff_row_is_gathered(const struct ff_job *j, uint32_t patch_side);
 
 /* A row of direct sight: t->sights becomes F[source -> element-side] of every
  * element-side that may see the source, with about `rays` rays between them. Returns

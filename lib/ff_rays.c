@@ -324,16 +324,16 @@ static struct ff_weight diffuse(struct ff_thread *t, uint32_t ps)
 	const struct ff_job *j = t->job;
 	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
 	struct ff_weight w = { rays, rays };
-	int gathered = j->gather.rays && j->shoots_diffuse[ps] &&
-	               (j->emits[ps] || ff_is_gathered(j, ps));
+	int gathered = j->gather.rays && j->shoots_diffuse[ps];
+	int alone = gathered && j->gather.alone && (j->emits[ps] || ff_row_is_gathered(j, ps));
 
-	if (gathered && j->gather.alone && ff_redistribute(t, ps, 0, &w))
+	if (alone && ff_redistribute(t, ps, 0, &w))
 		return w;
 	t->capturing = j->has_lobe[ps];
 	t->capture_weight = 1;
 	cast(t, ps, rays, -1);
 	t->capturing = 0;
-	if (gathered && !j->gather.alone)
+	if (gathered && !alone)
 		ff_redistribute(t, ps, rays, &w);
 	return w;
 }
