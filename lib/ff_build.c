@@ -272,13 +272,26 @@ static void report(void *arg, double done, double total)
 		p->to->fn(p->to->arg, p->before + done, p->total);
 }
 
+/* Before the rows, all elements gather. */
+static int gather(struct ff_job *j, struct ff_stats *stats, const struct progress *progress,
+                  struct err *e)
+{
+	struct part_progress pp = { progress, 0, 2. * (double)j->m->patches };
+	struct progress inner = { report, &pp };
+
+	if (!j->o.gather || j->o.method != FF_RAYS)
+		return 0;
+	return ff_gather(j, &stats->rays, &inner, e);
+}
+
 static int all_patches(struct run *r, uint32_t begin, uint32_t end, struct chains *whole,
                        struct ff_stats *stats, const struct ff_sink *sink,
                        const struct progress *progress, struct err *e)
 {
 	for (uint32_t p = begin; p < end; p += PATCHES_AT_A_TIME) {
 		size_t n = end - p < PATCHES_AT_A_TIME ? end - p : PATCHES_AT_A_TIME;
-		struct part_progress pp = { progress, p - begin, end - begin };
+		double before = r->job->gather.rays ? (double)r->job->m->patches : 0;
+		struct part_progress pp = { progress, before + p - begin, before + end - begin };
 		struct progress inner = { report, &pp };
 		r->first = p;
 		par_for(n, 1, r->job->o.threads, do_patches, r, &inner);
@@ -337,7 +350,7 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 		bad = thread_init(&run.thread[t], &job, e);
 	for (size_t i = 0; !bad && i < PATCHES_AT_A_TIME; i++)
 		run.batch[i].f64 = o->f64;
-	bad = bad || (o->gather && o->method == FF_RAYS && ff_gather(&job, &stats->rays, e));
+	bad = bad || gather(&job, stats, progress, e);
 	bad = bad || all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats,
 	                         sink, progress, e) || put_chains(whole, &chains, e);
 	for (int t = 0; run.thread && t < threads; t++) {

@@ -3,6 +3,7 @@
  * sends there, and what they tell of all patch-sides together adds up to what the
  * element can see: its irradiance is an average with stratified samples, where landings
  * of other patches' rays come by chance. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -18,6 +19,9 @@ static const double larger = 2.2, enough = .11;
 
 /* How far the sum of gathered factors may be from what must land there. */
 static const double misfit = .25;
+
+/* Looking at an element from afar takes so much less time than a ray. */
+enum { LOOKS_A_RAY = 4 };
 
 struct gatherer {
 	const struct ff_job *job;
@@ -95,6 +99,12 @@ static void gather_patches(void *arg, size_t begin, size_t end, int thread)
 		for (uint32_t el = j->m->patch_start[ps >> 1]; el < j->m->patch_start[(ps >> 1) + 1]; el++)
 			gather_element(g, ps >> 1, 2 * el + (ps & 1), thread);
 	}
+}
+
+static int takes(const struct ff_job *j, double patch_area, double element_area)
+{
+	return patch_area >= larger * element_area &&
+	       j->o.gather * patch_area >= enough * j->o.rays * element_area;
 }
 
 /* Pairs by receiver, in order, become lists by source, in the same order. */
@@ -188,14 +198,31 @@ static void release(struct gatherer *g, size_t threads)
 	free(g->sights);
 }
 
-int ff_gather(struct ff_job *j, double *rays, struct err *e)
+/* Whether the largest patch-side that shoots is large beside the smallest element. */
+static int any_takes(const struct ff_job *j)
+{
+	double most = 0, least = INFINITY;
+
+	for (size_t ps = 0; ps < 2 * j->m->patches; ps++)
+		if (j->shoots_diffuse[ps])
+			most = fmax(most, j->m->patch_area[ps >> 1]);
+	for (size_t i = 0; i < j->m->elements; i++)
+		least = fmin(least, j->m->element_area[i]);
+	return takes(j, most, least);
+}
+
+int ff_gather(struct ff_job *j, double *rays, const struct progress *progress, struct err *e)
 {
 	size_t threads = j->o.threads > 0 ? (size_t)j->o.threads : 1;
 	struct gatherer g = { .job = j, .to = &j->gather };
-	int bad = allocate(&g, threads, e);
+	int bad;
+
+	if (!any_takes(j))
+		return 0;
+	bad = allocate(&g, threads, e);
 
 	if (!bad) {
-		par_for(j->m->patches, 1, (int)threads, gather_patches, &g, NULL);
+		par_for(j->m->patches, 1, (int)threads, gather_patches, &g, progress);
 		bound_patches(j, j->gather.centre);
 		j->gather.alone = !rows_tell_more(j);
 	}
@@ -224,11 +251,15 @@ void ff_gather_free(struct ff_gather *g)
 
 /* ---- rows of what was gathered ---- */
 
-static int takes(const struct ff_job *j, uint32_t ps, uint32_t column)
+static int element_takes(const struct ff_job *j, uint32_t ps, uint32_t column)
 {
-	double area = j->m->patch_area[ps >> 1], element = j->m->element_area[column >> 1];
+	return takes(j, j->m->patch_area[ps >> 1], j->m->element_area[column >> 1]);
+}
 
-	return area >= larger * element && j->gather.rays * area >= enough * j->o.rays * element;
+int ff_row_is_seen(const struct ff_job *j, uint32_t ps)
+{
+	return j->emits[ps] &&
+	       j->m->elements <= LOOKS_A_RAY * (uint64_t)j->o.rays * j->o.emitter_gain;
 }
 
 int ff_row_is_gathered(const struct ff_job *j, uint32_t ps)
@@ -236,9 +267,11 @@ int ff_row_is_gathered(const struct ff_job *j, uint32_t ps)
 	const struct ff_gather *g = &j->gather;
 	uint64_t i = g->start[ps], end = g->start[ps + 1];
 
-	if (!g->alone || i == end)
+	if (!g->alone || ff_row_is_seen(j, ps))
+		return g->alone;
+	if (i == end)
 		return 0;
-	while (i < end && takes(j, ps, g->seen[i].column))
+	while (i < end && element_takes(j, ps, g->seen[i].column))
 		i++;
 	return i == end;
 }
@@ -254,7 +287,7 @@ static double recall(struct ff_thread *t, uint32_t ps)
 	for (uint64_t i = g->start[ps]; i < g->start[ps + 1]; i++) {
 		double n = g->seen[i].count, one = scale * j->m->element_area[g->seen[i].column >> 1];
 		struct ff_sight s = { g->seen[i].column, one * n, one * one * n * (1 - n / g->rays) };
-		if (!takes(j, ps, s.column))
+		if (!element_takes(j, ps, s.column))
 			continue;
 		if (vec_append(&t->sights, &s, 1, sizeof s, &t->tally.err))
 			return 0;
@@ -270,7 +303,7 @@ static uint32_t next_taken(const struct ff_thread *t, uint32_t ps, uint64_t plac
 	uint32_t at = tally_next(&t->tally, place);
 
 	while (at != UINT32_MAX && (j->is_ideal[tally_side_at(&t->tally, at)] ||
-	                            !(j->emits[ps] || takes(j, ps, j->places.column[at]))))
+	                            !(ff_row_is_seen(j, ps) || element_takes(j, ps, j->places.column[at]))))
 		at = tally_next(&t->tally, (uint64_t)at + 1);
 	return at;
 }
@@ -333,7 +366,8 @@ int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_w
 {
 	const struct ff_job *j = t->job;
 	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
-	double sum = j->emits[ps] ? ff_see(t, ps, rays, &t->tally.err) : recall(t, ps);
+	int seen = ff_row_is_seen(j, ps);
+	double sum = seen ? ff_see(t, ps, rays, &t->tally.err) : recall(t, ps);
 	double variance = 0, total = cast ? cast : 1;
 
 	for (size_t i = 0; i < t->sights.n; i++)
@@ -346,7 +380,7 @@ int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_w
 		return 0;
 	}
 	put_sights(t, ps, total * lands / sum);
-	double samples = cast || j->emits[ps] ? rays : sum * sum / variance;
+	double samples = cast || seen ? rays : sum * sum / variance;
 	*w = (struct ff_weight){ (uint32_t)fmax(1, fmin(rays, samples)), total };
 	return 1;
 }

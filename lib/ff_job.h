@@ -145,10 +145,15 @@ void ff_follow_on(struct ff_thread *t, const double org[3], const double dir[3],
  * pane, jointly stratified over its area and hemisphere, into j->gather; adds to *rays.
  * Memory: 16 bytes for every pair of an element-side and a patch-side that it sees.
  * O(element-sides x rays x log triangles). 0, or -1 and e. */
-int ff_gather(struct ff_job *j, double *rays, struct err *e);
+int ff_gather(struct ff_job *j, double *rays, const struct progress *progress,
+              struct err *e);
 void ff_gather_free(struct ff_gather *g);
 
-/* 1 if the row of a patch-side that emits nothing needs no rays of its own. */
+/* 1 if the row of a patch-side is made with point pairs (ff_see): an emitter's, unless
+ * looking at every element costs more than the row's rays. */
+int ff_row_is_seen(const struct ff_job *j, uint32_t patch_side);
+
+/* 1 if the row of a patch-side needs no rays of its own. */
 int ff_row_is_gathered(const struct ff_job *j, uint32_t patch_side);
 
 /* A row of direct sight: t->sights becomes F[source -> element-side] of every
@@ -166,8 +171,8 @@ struct ff_weight {
 	double total;
 };
 
-/* Lets what was gathered, or seen (for emitters), decide where the light of patch-side ps
- * lands: of what the `cast` rays of its own, tallied already, brought to any element, or
+/* Lets what was gathered, or seen, decide where the light of patch-side ps lands: of what
+ * the `cast` rays of its own, tallied already, brought to elements that know better, or
  * (cast = 0) of all that neither escapes nor meets a black side. 1 if it did, else the
  * tally is left alone. */
 int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_weight *w);

@@ -325,7 +325,7 @@ static struct ff_weight diffuse(struct ff_thread *t, uint32_t ps)
 	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
 	struct ff_weight w = { rays, rays };
 	int gathered = j->gather.rays && j->shoots_diffuse[ps];
-	int alone = gathered && j->gather.alone && (j->emits[ps] || ff_row_is_gathered(j, ps));
+	int alone = gathered && ff_row_is_gathered(j, ps);
 
 	if (alone && ff_redistribute(t, ps, 0, &w))
 		return w;
