@@ -380,7 +380,8 @@ int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_w
 		return 0;
 	}
 	put_sights(t, ps, total * lands / sum);
-	double samples = cast || seen ? rays : sum * sum / variance;
-	*w = (struct ff_weight){ (uint32_t)fmax(1, fmin(rays, samples)), total };
+	if (cast)
+		variance += (1 - lands) / cast;
+	*w = (struct ff_weight){ (uint32_t)fmax(1, fmin(UINT32_MAX, 1 / variance)), total };
 	return 1;
 }

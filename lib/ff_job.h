@@ -167,7 +167,7 @@ double ff_see(struct ff_thread *t, uint32_t source, uint32_t rays, struct err *e
 
 /* What a row's weights are counted in. */
 struct ff_weight {
-	uint32_t samples;         /* behind the row */
+	uint32_t samples;         /* independent ones that the row is worth */
 	double total;
 };
 
