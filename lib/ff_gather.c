@@ -37,7 +37,7 @@ struct pair {
 	uint32_t source, count;
 };
 
-/* The rays of an element-side; the part that escapes, the part that meets black sides. */
+/* The rays of an element-side; how many escape, how many meet black sides. */
 static void cast(struct gatherer *g, uint32_t column, int thread, uint32_t lost[2])
 {
 	const struct ff_job *j = g->job;
@@ -47,14 +47,9 @@ static void cast(struct gatherer *g, uint32_t column, int thread, uint32_t lost[
 
 	for (int d = 0; d < FF_DIMS; d++)
 		seeds[d] = rng_sobol_seed(seed, d);
-	for (int i = 0; i < RAY_BATCH; i++)
-		b.element[i] = column >> 1;
 	for (uint32_t first = 0; first < j->o.gather; first += RAY_BATCH) {
 		uint32_t n = j->o.gather - first < RAY_BATCH ? j->o.gather - first : RAY_BATCH;
-		ff_batch_numbers(&j->of_gathering, seeds, first, n, &b);
-		ff_batch_origins(j, (int)(column & 1), n, &b);
-		ff_batch_directions(j, (int)(column & 1), n, &b);
-		ff_batch_cast(j, n, &b);
+		ff_batch_from_element(j, &j->of_gathering, seeds, column, first, n, &b);
 		for (uint32_t i = 0; i < n; i++) {
 			if (b.ray.triangle[i] == RAY_MISS) {
 				lost[0]++;

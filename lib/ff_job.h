@@ -130,6 +130,11 @@ void ff_batch_directions(const struct ff_job *j, int side, uint32_t n,
 /* Casts n rays and finds the elements where they land. */
 void ff_batch_cast(const struct ff_job *j, uint32_t n, struct ff_batch_rays *b);
 
+/* The same from one element-side: rays first to first + n of a replicate. */
+void ff_batch_from_element(const struct ff_job *j, const struct ff_samples *s,
+                           const uint32_t seed[4], uint32_t column, uint32_t first,
+                           uint32_t n, struct ff_batch_rays *b);
+
 /* Unit normal of a side of an element. */
 void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3]);
 

@@ -208,6 +208,18 @@ void ff_batch_cast(const struct ff_job *j, uint32_t n, struct ff_batch_rays *b)
 		b->hit[i] = locate_below(l, *way[i], b->ray.w[0][i], b->ray.w[1][i]);
 }
 
+void ff_batch_from_element(const struct ff_job *j, const struct ff_samples *s,
+                           const uint32_t seed[4], uint32_t column, uint32_t first,
+                           uint32_t n, struct ff_batch_rays *b)
+{
+	for (uint32_t i = 0; i < n; i++)
+		b->element[i] = column >> 1;
+	ff_batch_numbers(s, seed, first, n, b);
+	ff_batch_origins(j, (int)(column & 1), n, b);
+	ff_batch_directions(j, (int)(column & 1), n, b);
+	ff_batch_cast(j, n, b);
+}
+
 static void world_ray(const struct ff_job *j, const struct ff_batch_rays *b, uint32_t i,
                       double org[3], double dir[3])
 {

@@ -107,13 +107,8 @@ static struct ff_sight by_rays(struct ff_thread *t, uint32_t source, uint32_t co
 
 	for (int d = 0; d < FF_DIMS; d++)
 		seeds[d] = rng_sobol_seed(seed, d);
-	for (int i = 0; i < RAY_BATCH; i++)
-		b.element[i] = column >> 1;
 	for (uint32_t first = 0; first < CLOSE_RAYS; first += RAY_BATCH) {
-		ff_batch_numbers(&j->of_rows, seeds, first, RAY_BATCH, &b);
-		ff_batch_origins(j, (int)(column & 1), RAY_BATCH, &b);
-		ff_batch_directions(j, (int)(column & 1), RAY_BATCH, &b);
-		ff_batch_cast(j, RAY_BATCH, &b);
+		ff_batch_from_element(j, &j->of_rows, seeds, column, first, RAY_BATCH, &b);
 		for (int i = 0; i < RAY_BATCH; i++)
 			hits += b.ray.triangle[i] != RAY_MISS && b.ray.side[i] == (source & 1) &&
 			        j->m->element_patch[b.hit[i]] == source >> 1;
