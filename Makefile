@@ -62,7 +62,7 @@ $(BUILD)/%.o: %.c
 	$(CC) $(CPPFLAGS) $(CFLAGS) -c -o $@ $<
 
 # Loops written to become vector code.
-$(BUILD)/lib/ff_sample.o: CFLAGS += -O3
+$(BUILD)/lib/ff_sample.o: CFLAGS += -O3 -fno-math-errno -fno-trapping-math
 
 # tinygltf and nlohmann's header are not ours to hold to our warnings.
 $(BUILD)/%.o: %.cc

@@ -50,7 +50,8 @@ struct ff {
 	size_t rows;
 	uint32_t *row_side;       /* patch-side the flux leaves */
 	uint8_t *row_kind;
-	uint32_t *row_samples;    /* rays or hemicube pixels spent on block 0 */
+	uint32_t *row_samples;    /* rays or hemicube pixels spent on block 0, or as
+	                             many independent rays as gathered values are worth */
 	double *row_scale;
 	double *row_residual;     /* 1 - sum before scaling (raw closure error) */
 	double *row_error;        /* error of the row, in the norm "root of the summed squares

@@ -51,9 +51,6 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 static int job_arrays(struct ff_job *j, struct err *e)
 {
 	size_t sides = 2 * j->m->patches;
-	uint64_t n = (uint64_t)j->o.rays * j->o.emitter_gain / FF_REPLICATES;
-
-	j->sobol_points = n < SOBOL_POINTS_MAX ? (uint32_t)n : SOBOL_POINTS_MAX;
 	j->element = mem_new(j->m->elements, sizeof *j->element, "sampling tables", e);
 	j->shoots_diffuse = mem_new(sides, 1, "patch flags", e);
 	j->shoots_lobe = mem_new(sides, 1, "patch flags", e);
@@ -62,9 +59,8 @@ static int job_arrays(struct ff_job *j, struct err *e)
 	j->is_source = mem_new(sides, 1, "patch flags", e);
 	j->is_black = mem_new(sides, 1, "patch flags", e);
 	j->is_ideal = mem_new(sides, 1, "patch flags", e);
-	j->sobol = mem_new((size_t)j->sobol_points * FF_DIMS, sizeof *j->sobol, "sample points", e);
 	return j->element && j->shoots_diffuse && j->shoots_lobe && j->has_lobe && j->emits &&
-	       j->is_source && j->is_black && j->is_ideal && j->sobol ? 0 : -1;
+	       j->is_source && j->is_black && j->is_ideal ? 0 : -1;
 }
 
 /* Bits of x spread to the even places. */
@@ -79,28 +75,64 @@ static uint64_t spread(uint32_t x)
 	return (v | v << 1) & 0x5555555555555555u;
 }
 
+struct sample {
+	uint32_t bits[FF_DIMS];
+};
+
 static int by_direction(const void *a, const void *b)
 {
-	const uint32_t *x = a, *y = b;
+	const uint32_t *x = ((const struct sample *)a)->bits, *y = ((const struct sample *)b)->bits;
 	uint64_t p = spread(rng_reverse_bits(x[2])) << 1 | spread(rng_reverse_bits(x[3]));
 	uint64_t q = spread(rng_reverse_bits(y[2])) << 1 | spread(rng_reverse_bits(y[3]));
 
 	return (p > q) - (p < q);
 }
 
-/* The sample points, each aligned block of a power of two in an order in which
- * neighbours have similar directions (their places on a Morton curve, which scrambling
- * keeps): rays and memory then see coherent work. A replicate is whole blocks. */
-static void fill_samples(struct ff_job *j)
+/* The first n sample points, each aligned block of a power of two that divides `each` in
+ * an order in which neighbours have similar directions (their places on a Morton curve,
+ * which scrambling keeps): rays and memory then see coherent work. */
+static int fill_samples(struct ff_samples *s, uint32_t each, uint64_t n, struct err *e)
 {
-	uint32_t each = j->o.rays / FF_REPLICATES, block = each & (~each + 1);
+	uint32_t block = each & (~each + 1);
 
-	for (uint32_t i = 0; i < j->sobol_points; i++)
+	s->n = n < SOBOL_POINTS_MAX ? (uint32_t)n : SOBOL_POINTS_MAX;
+	s->bits = mem_new((size_t)s->n * FF_DIMS, sizeof *s->bits, "sample points", e);
+	struct sample *sample = mem_new(s->n, sizeof *sample, "sample points", e);
+	for (uint32_t i = 0; s->bits && sample && i < s->n; i++)
 		for (int d = 0; d < FF_DIMS; d++)
-			j->sobol[(size_t)i * FF_DIMS + (size_t)d] = rng_sobol_bits(i, d);
-	for (uint32_t i = 0; j->o.method == FF_RAYS && block && i + block <= j->sobol_points;
-	     i += block)
-		qsort(j->sobol + (size_t)i * FF_DIMS, block, FF_DIMS * sizeof *j->sobol, by_direction);
+			sample[i].bits[d] = rng_sobol_bits(i, d);
+	for (uint32_t i = 0; s->bits && sample && block && i + block <= s->n; i += block)
+		qsort(sample + i, block, sizeof *sample, by_direction);
+	for (uint32_t i = 0; s->bits && sample && i < s->n; i++)
+		for (uint32_t d = 0; d < FF_DIMS; d++)
+			s->bits[(size_t)d * s->n + i] = sample[i].bits[d];
+	free(sample);
+	return s->bits && sample ? 0 : -1;
+}
+
+/* A replicate is whole blocks of the rows' points, an element-side's rays are of the
+ * gathering ones. */
+static int make_samples(struct ff_job *j, struct err *e)
+{
+	uint32_t each = j->o.rays / FF_REPLICATES, gather = j->o.gather;
+
+	if (j->o.method != FF_RAYS)
+		return 0;
+	return fill_samples(&j->of_rows, each, (uint64_t)each * j->o.emitter_gain, e) ||
+	       fill_samples(&j->of_gathering, gather, gather, e) ? -1 : 0;
+}
+
+/* A ray that lands on some sides has more to it than where it lands. */
+static int make_places(struct ff_job *j, struct err *e)
+{
+	uint8_t *apart = mem_new(2 * j->m->patches, 1, "patch flags", e);
+	int bad = !apart;
+
+	for (size_t ps = 0; !bad && ps < 2 * j->m->patches; ps++)
+		apart[ps] = j->is_black[ps] || j->is_ideal[ps] || j->has_lobe[ps];
+	bad = bad || tally_places_init(&j->places, j->m, apart, e);
+	free(apart);
+	return bad ? -1 : 0;
 }
 
 static int job_init(struct ff_job *j, const struct model *m, const struct ff_options *o,
@@ -113,21 +145,23 @@ static int job_init(struct ff_job *j, const struct model *m, const struct ff_opt
 	if (o->method == FF_HEMICUBE && (hemi_grid_init(&j->grid, (int)o->rays, e) ||
 	                                 !(j->cubes = hemi_scene_new(m, e))))
 		return -1;
-	fill_samples(j);
 	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
 		side_flags(j, ps);
 	ff_element_table(j);
-	return 0;
+	return make_samples(j, e) || make_places(j, e) ? -1 : 0;
 }
 
 static void job_free(struct ff_job *j)
 {
 	void *array[] = { j->element, j->shoots_diffuse, j->shoots_lobe, j->has_lobe,
-		j->is_source, j->emits, j->is_ideal, j->is_black, j->sobol };
+		j->is_source, j->emits, j->is_ideal, j->is_black, j->of_rows.bits,
+		j->of_gathering.bits };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
 	locator_free(&j->locator);
+	tally_places_free(&j->places);
+	ff_gather_free(&j->gather);
 	ray_scene_free(j->rays);
 	hemi_scene_free(j->cubes);
 	hemi_grid_free(&j->grid);
@@ -136,7 +170,7 @@ static void job_free(struct ff_job *j)
 static int thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e)
 {
 	*t = (struct ff_thread){ .job = j };
-	if (tally_init(&t->tally, j->m, j->has_lobe, e))
+	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, e))
 		return -1;
 	if (j->o.method != FF_HEMICUBE)
 		return 0;
@@ -151,6 +185,7 @@ static void thread_free(struct ff_thread *t)
 	tally_free(&t->tally);
 	hemicube_free(&t->cube);
 	free(t->captures.data);
+	free(t->sights.data);
 	free(t->item);
 	free(t->view);
 	free(t->chain_map.data);
@@ -238,13 +273,26 @@ static void report(void *arg, double done, double total)
 		p->to->fn(p->to->arg, p->before + done, p->total);
 }
 
+/* Before the rows, all elements gather. */
+static int gather(struct ff_job *j, struct ff_stats *stats, const struct progress *progress,
+                  struct err *e)
+{
+	struct part_progress pp = { progress, 0, 2. * (double)j->m->patches };
+	struct progress inner = { report, &pp };
+
+	if (!j->o.gather || j->o.method != FF_RAYS)
+		return 0;
+	return ff_gather(j, &stats->rays, &inner, e);
+}
+
 static int all_patches(struct run *r, uint32_t begin, uint32_t end, struct chains *whole,
                        struct ff_stats *stats, const struct ff_sink *sink,
                        const struct progress *progress, struct err *e)
 {
 	for (uint32_t p = begin; p < end; p += PATCHES_AT_A_TIME) {
 		size_t n = end - p < PATCHES_AT_A_TIME ? end - p : PATCHES_AT_A_TIME;
-		struct part_progress pp = { progress, p - begin, end - begin };
+		double before = r->job->gather.rays ? (double)r->job->m->patches : 0;
+		struct part_progress pp = { progress, before + p - begin, before + end - begin };
 		struct progress inner = { report, &pp };
 		r->first = p;
 		par_for(n, 1, r->job->o.threads, do_patches, r, &inner);
@@ -307,7 +355,8 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 		bad = ff_matrix(&job, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
 		      put_chains(whole, &chains, e);
 	else
-		bad = bad || all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats,
+		bad = bad || gather(&job, stats, progress, e) ||
+		      all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats,
 	                         sink, progress, e) || put_chains(whole, &chains, e);
 	for (int t = 0; run.thread && t < threads; t++) {
 		stats->rays += run.thread[t].rays;

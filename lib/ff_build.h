@@ -14,6 +14,7 @@ struct ff_options {
 	uint32_t rays;        /* rays: a patch-side; hemicube: pixels along an edge */
 	uint32_t points;      /* hemicube: sample points on a patch */
 	uint32_t emitter_gain;/* rays: this many times the rays for emitters */
+	uint32_t gather;      /* rays: that an element-side gathers with; 0: rows alone */
 	uint32_t lobe_rays;   /* rays spent on the G rows of a patch-side and lobe */
 	uint32_t depth;       /* longest chain of ideal events followed */
 	uint64_t seed;

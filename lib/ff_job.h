@@ -9,15 +9,39 @@
 #include "ray.h"
 #include "rng.h"
 
-enum { FF_REPLICATES = 4, FF_DIMS = 5 };
+enum { FF_REPLICATES = 4, FF_DIMS = 4 };
 
-/* An element as a place to send rays from. */
+/* An element as a place to send rays from. Points are corner + w1 edge[0] + w2 edge[1],
+ * with weights that keep a little clear of the edges. Threes are padded to four. */
 struct ff_element {
+	double corner[4], edge[2][4];
+	float normal[4], tangent[2][4]; /* orthonormal; front */
 	double cdf;               /* area of the patch's elements up to and with this */
 	double per_area;
-	double corner[3], edge[2][3]; /* points are corner + w1 edge[0] + w2 edge[1], with
-	                             weights that keep a little clear of the edges */
-	double tangent[2][3];     /* with the front normal an orthonormal frame */
+	uint32_t before;          /* 2^32 times the part of the patch's area before it */
+	float per_part;           /* 1 / the same of its own area */
+};
+
+/* The first points of the Sobol sequence, in an order in which neighbours have similar
+ * directions; beyond them points follow as they are. */
+struct ff_samples {
+	uint32_t n;
+	uint32_t *bits;           /* [FF_DIMS][n] */
+};
+
+/* What elements saw: hits of their rays on each patch-side that shoots. */
+struct ff_gathered {
+	uint32_t column, count;   /* element-side, its rays that landed here */
+};
+
+struct ff_gather {
+	uint32_t rays;            /* from an element-side; 0: nothing was gathered */
+	int alone;                /* rows tell of nothing but diffuse landings */
+	uint64_t *start;          /* [2P+1] of a patch-side, ordered by place */
+	struct ff_gathered *seen;
+	double (*centre)[4];      /* [P] of a patch, and the distance of its farthest vertex */
+	double *escape, *black;   /* [2P] parts of what leaves a patch-side, the same rays
+	                             taken as its own */
 };
 
 /* Shared, read-only while rows are computed. */
@@ -36,8 +60,9 @@ struct ff_job {
 	uint8_t *has_lobe;        /* [2P] light arriving here leaves by a finite lobe */
 	uint8_t *emits;           /* [2P] gives light of its own */
 	uint8_t *is_source;       /* [2P] any light leaves here */
-	uint32_t *sobol;          /* [sobol_points][FF_DIMS] bits */
-	uint32_t sobol_points;
+	struct ff_samples of_rows, of_gathering;
+	struct tally_places places;
+	struct ff_gather gather;
 };
 
 /* A way that light can come to a directional patch-side: sampled backwards. */
@@ -47,6 +72,15 @@ struct capture {
 	uint32_t view;            /* hemicube: which sample point */
 	double w;
 	double x[3], l[3];        /* the point, the unit direction to the source */
+};
+
+/* A batch of rays: numbers, origins, directions, where they land. */
+struct ff_batch_rays {
+	uint32_t element[RAY_BATCH];      /* where each begins */
+	uint32_t choice[RAY_BATCH];       /* 32 bits to choose the element by */
+	float u[4][RAY_BATCH];            /* numbers in [0,1): position, direction */
+	struct ray_batch ray;
+	uint32_t hit[RAY_BATCH];          /* element where each lands */
 };
 
 /* A hemicube's place: just off one side of the patch. */
@@ -67,6 +101,9 @@ struct ff_thread {
 	uint32_t *item;           /* hemicube: [points][2 sides][pixels] of the patch */
 	struct view *view;        /* hemicube: [points][2 sides] */
 	double rays;
+	struct vec sights;        /* struct ff_sight */
+	struct ff_batch_rays lobe; /* lobe rays waiting to be cast */
+	uint32_t lobes;
 	struct vec chain_map;     /* local -> whole */
 };
 
@@ -77,26 +114,29 @@ void ff_element_table(struct ff_job *j);
  * position (on the surface, not moved off it). */
 uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, double x[3]);
 
-/* A batch of a row's rays, Lambertian from a patch-side, one array a coordinate. */
-enum { FF_BATCH = 64 };
-
-struct ff_batch_rays {
-	uint32_t element[FF_BATCH];       /* where each begins */
-	double org[3][FF_BATCH];          /* off the surface */
-	double dir[3][FF_BATCH];
-	double u[4][FF_BATCH];            /* the numbers they were made from */
-};
-
-/* Rays first to first + n (n <= FF_BATCH) of a scrambled replicate. */
-void ff_batch_numbers(const struct ff_job *j, const uint32_t seed[4], uint32_t first,
+/* The numbers of rays first to first + n (n <= RAY_BATCH) of a scrambled replicate. */
+void ff_batch_numbers(const struct ff_samples *s, const uint32_t seed[4], uint32_t first,
                       uint32_t n, struct ff_batch_rays *b);
-void ff_batch_origins(const struct ff_job *j, uint32_t patch_side, uint32_t n,
-                      struct ff_batch_rays *b);
-void ff_batch_directions(const struct ff_job *j, uint32_t patch_side, uint32_t n,
+
+/* Elements of a patch for the rays, by area; u[0] becomes what is left of the choice. */
+void ff_batch_elements(const struct ff_job *j, uint32_t patch, uint32_t n,
+                       struct ff_batch_rays *b);
+
+/* Origins off a side of the elements, and Lambertian directions from there. */
+void ff_batch_origins(const struct ff_job *j, int side, uint32_t n, struct ff_batch_rays *b);
+void ff_batch_directions(const struct ff_job *j, int side, uint32_t n,
                          struct ff_batch_rays *b);
 
 /* Adds a batch's rows to the statistics. */
 void ff_count(struct ff_stats *s, const struct ff *f);
+
+/* Casts n rays and finds the elements where they land. */
+void ff_batch_cast(const struct ff_job *j, uint32_t n, struct ff_batch_rays *b);
+
+/* The same from one element-side: rays first to first + n of a replicate. */
+void ff_batch_from_element(const struct ff_job *j, const struct ff_samples *s,
+                           const uint32_t seed[4], uint32_t column, uint32_t first,
+                           uint32_t n, struct ff_batch_rays *b);
 
 /* Unit normal of a side of an element. */
 void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3]);
@@ -109,6 +149,42 @@ void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], do
 /* The same for a ray of chain 0 whose first landing has been tallied already. */
 void ff_follow_on(struct ff_thread *t, const double org[3], const double dir[3], double w);
 
+/* Casts o.gather rays from every element-side that is modelled and no ideal mirror or
+ * pane, jointly stratified over its area and hemisphere, into j->gather; adds to *rays.
+ * Memory: 16 bytes for every pair of an element-side and a patch-side that it sees.
+ * O(element-sides x rays x log triangles). 0, or -1 and e. */
+int ff_gather(struct ff_job *j, double *rays, const struct progress *progress,
+              struct err *e);
+void ff_gather_free(struct ff_gather *g);
+
+/* 1 if the row of a patch-side is made with point pairs (ff_see): an emitter's, unless
+ * looking at every element costs more than the row's rays. */
+int ff_row_is_seen(const struct ff_job *j, uint32_t patch_side);
+
+/* 1 if the row of a patch-side needs no rays of its own. */
+int ff_row_is_gathered(const struct ff_job *j, uint32_t patch_side);
+
+/* A row of direct sight: t->sights becomes F[source -> element-side] of every
+ * element-side that may see the source, with about `rays` rays between them. Returns
+ * their sum. O(elements + rays). */
+struct ff_sight {
+	uint32_t column;
+	double w, variance;
+};
+double ff_see(struct ff_thread *t, uint32_t source, uint32_t rays, struct err *e);
+
+/* What a row's weights are counted in. */
+struct ff_weight {
+	uint32_t samples;         /* independent ones that the row is worth */
+	double total;
+};
+
+/* Lets what was gathered, or seen, decide where the light of patch-side ps lands: of what
+ * the `cast` rays of its own, tallied already, brought to elements that know better, or
+ * (cast = 0) of all that neither escapes nor meets a black side. 1 if it did, else the
+ * tally is left alone. */
+int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_weight *w);
+
 /* All rows of one patch into the batch. 0, or -1 and e. */
 int ff_patch_rays(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
 int ff_patch_hemicube(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
@@ -116,6 +192,9 @@ int ff_patch_hemicube(struct ff_thread *t, uint32_t patch, struct ff_batch *b, s
 /* Casts one lobe direction from a capture's point off a side. */
 typedef void ff_cast_fn(struct ff_thread *t, const struct capture *c, int side,
                         const double dir[3], double w);
+
+/* Casts what waits in t->lobe. */
+void ff_lobes_cast(struct ff_thread *t);
 
 /* Turns the captures of a directional patch-side into links with their G rows. */
 int ff_links(struct ff_thread *t, uint32_t patch_side, ff_cast_fn *cast, struct ff_batch *b,

@@ -183,6 +183,7 @@ static int lobe_row(struct ff_thread *t, uint32_t ps, const struct capture *c, s
 			cumulated += c[++at].w;
 		cast_one(t, &c[at], side, transmitted, exponent, u, cast);
 	}
+	ff_lobes_cast(t);
 	return tally_finish(&t->tally, b, (ps & ~1u) | (uint32_t)out,
 	                    transmitted ? FF_TRANSMITTED : FF_REFLECTED, rays, rays, e);
 }

@@ -157,7 +157,8 @@ static void rest(const struct matrix *m, uint32_t ps, uint32_t *escapes, uint32_
 		if (hit.triangle == RAY_MISS)
 			++*escapes;
 		else
-			*blacks += j->is_black[2 * (j->m->element_patch[locate(&j->locator, hit.triangle, hit.w)]) +
+			*blacks += j->is_black[2 * j->m->element_patch[locate(&j->locator, hit.triangle,
+			                                      (float)hit.w[1], (float)hit.w[2])] +
 			                       (uint32_t)hit.side];
 	}
 }

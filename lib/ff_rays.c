@@ -123,7 +123,8 @@ static int land(struct ff_thread *t, const struct flight *f, const struct ray_hi
 
 static uint32_t element_of(const struct ff_job *j, const struct ray_hit *hit)
 {
-	return hit->triangle == RAY_MISS ? 0 : locate(&j->locator, hit->triangle, hit->w);
+	return hit->triangle == RAY_MISS ? 0 : locate(&j->locator, hit->triangle,
+	                                              (float)hit->w[1], (float)hit->w[2]);
 }
 
 /* Casts the flights of a stack and all that come of them. */
@@ -176,73 +177,104 @@ static struct scramble scramble(const struct ff_job *j, uint32_t row, uint32_t r
 	return s;
 }
 
-/* Rays are made, cast, located and tallied by the batch: each loop then overlaps the
- * latencies of many rays, where one ray at a time would wait for each in turn. */
-struct batch {
-	struct ff_batch_rays rays;
-	struct ray_hit hit[FF_BATCH];
-	uint32_t element[FF_BATCH];   /* element it hits */
-	const int32_t *way[FF_BATCH]; /* where the search for it begins */
-};
-
 /* Directions of an emission lobe about the normal instead of Lambertian ones. */
 static void lobe_directions(const struct ff_job *j, uint32_t ps, double exponent, uint32_t n,
                             struct ff_batch_rays *b)
 {
 	for (uint32_t i = 0; i < n; i++) {
-		double normal[3], dir[3], u[2] = { b->u[2][i], b->u[3][i] };
+		double normal[3], dir[3], u[2] = { (double)b->u[2][i], (double)b->u[3][i] };
 		ff_normal(j, b->element[i], (int)(ps & 1), normal);
 		lobe_sample(exponent, normal, normal, u, dir);
 		for (int k = 0; k < 3; k++)
-			b->dir[k][i] = dir[k];
+			b->ray.dir[k][i] = (float)dir[k];
 	}
 }
 
-static void batch_cast(const struct ff_job *j, uint32_t n, struct batch *b)
+/* Rays are made, cast, located and tallied by the batch: each loop then overlaps the
+ * latencies of many rays, where one ray at a time would wait for each in turn. */
+void ff_batch_cast(const struct ff_job *j, uint32_t n, struct ff_batch_rays *b)
 {
 	static const int32_t nowhere = ~0;
 	const struct locator *l = &j->locator;
+	const int32_t *way[RAY_BATCH]; /* where the search for an element begins */
 
+	ray_nearest_batch(j->rays, &b->ray, n);
 	for (uint32_t i = 0; i < n; i++) {
-		const struct ray_hit *hit = &b->hit[i];
-		double org[3], dir[3];
-		for (int k = 0; k < 3; k++) {
-			org[k] = b->rays.org[k][i];
-			dir[k] = b->rays.dir[k][i];
-		}
-		ray_nearest(j->rays, org, dir, &b->hit[i]);
-		b->way[i] = hit->triangle == RAY_MISS ? &nowhere
-		          : l->size[hit->triangle] ? &l->cell[locate_cell(l, hit->triangle, hit->w)]
-		                                   : &j->m->triangle_split[hit->triangle];
-		__builtin_prefetch(b->way[i]);
+		way[i] = b->ray.triangle[i] == RAY_MISS ? &nowhere
+		       : locate_begin(l, b->ray.triangle[i], b->ray.w[0][i], b->ray.w[1][i]);
+		__builtin_prefetch(way[i]);
 	}
 	for (uint32_t i = 0; i < n; i++)
-		if (*b->way[i] >= 0) {
-			__builtin_prefetch(&l->node[*b->way[i]]);
-			__builtin_prefetch(&j->m->split[*b->way[i]]);
-		}
-	for (uint32_t i = 0; i < n; i++)
-		b->element[i] = locate_below(l, *b->way[i], b->hit[i].w);
+		b->hit[i] = locate_below(l, *way[i], b->ray.w[0][i], b->ray.w[1][i]);
 }
 
-static void batch_land(struct ff_thread *t, int side, uint32_t n, const struct batch *b)
+void ff_batch_from_element(const struct ff_job *j, const struct ff_samples *s,
+                           const uint32_t seed[4], uint32_t column, uint32_t first,
+                           uint32_t n, struct ff_batch_rays *b)
+{
+	for (uint32_t i = 0; i < n; i++)
+		b->element[i] = column >> 1;
+	ff_batch_numbers(s, seed, first, n, b);
+	ff_batch_origins(j, (int)(column & 1), n, b);
+	ff_batch_directions(j, (int)(column & 1), n, b);
+	ff_batch_cast(j, n, b);
+}
+
+static void world_ray(const struct ff_job *j, const struct ff_batch_rays *b, uint32_t i,
+                      double org[3], double dir[3])
+{
+	struct ray_units units = ray_units(j->rays);
+
+	for (int k = 0; k < 3; k++) {
+		org[k] = units.centre[k] + (double)b->ray.org[k][i] / units.per_unit;
+		dir[k] = (double)b->ray.dir[k][i];
+	}
+	v3_normalise(dir);
+}
+
+/* Ray i of a batch, at all that may befall it. side: that it left its element by. */
+static void land_apart(struct ff_thread *t, int side, const struct ff_batch_rays *b, uint32_t i)
 {
 	struct flight stack[MAX_SPLITS + 3], f = { .w = 1 };
+	double x = (double)b->ray.w[0][i], y = (double)b->ray.w[1][i];
+	struct ray_hit hit = { .triangle = b->ray.triangle[i], .side = (int)b->ray.side[i],
+	                       .w = { 1 - x - y, x, y } };
+
+	world_ray(t->job, b, i, f.org, f.dir);
+	if (t->capturing) {
+		double normal[3];
+		t->now = (struct capture){ .element = b->element[i] };
+		ff_normal(t->job, b->element[i], side, normal);
+		v3_mad(f.org, -ray_offset(t->job->rays), normal, t->now.x);
+		memcpy(t->now.l, f.dir, sizeof t->now.l);
+	}
+	fly(t, stack, land(t, &f, &hit, b->hit[i], stack));
+}
+
+static void batch_land(struct ff_thread *t, int side, uint32_t n, const struct ff_batch_rays *b)
+{
+	const uint32_t *place = t->job->places.place;
+	uint32_t escaped = 0, simple = 0;
 
 	for (uint32_t i = 0; i < n; i++) {
-		for (int k = 0; k < 3; k++) {
-			f.org[k] = b->rays.org[k][i];
-			f.dir[k] = b->rays.dir[k][i];
-		}
 		if (t->capturing) {
-			double normal[3];
-			t->now = (struct capture){ .element = b->rays.element[i] };
-			ff_normal(t->job, b->rays.element[i], side, normal);
-			v3_mad(f.org, -ray_offset(t->job->rays), normal, t->now.x);
-			memcpy(t->now.l, f.dir, sizeof t->now.l);
+			land_apart(t, side, b, i);
+			continue;
 		}
-		fly(t, stack, land(t, &f, &b->hit[i], b->element[i], stack));
+		if (b->ray.triangle[i] == RAY_MISS) {
+			escaped++;
+			continue;
+		}
+		uint32_t at = place[2 * b->hit[i] + b->ray.side[i]];
+		if (at & TALLY_APART) {
+			land_apart(t, side, b, i);
+		} else {
+			tally_count(&t->tally, at);
+			simple++;
+		}
 	}
+	t->rays += escaped + simple;
+	tally_rest(&t->tally, 0)->escape += escaped;
 }
 
 /* Casts `count` rays from a patch-side: Lambertian (exponent < 0) or an emission lobe. */
@@ -250,33 +282,72 @@ static void cast(struct ff_thread *t, uint32_t ps, uint32_t count, double expone
 {
 	const struct ff_job *j = t->job;
 	uint32_t each = count / FF_REPLICATES;
-	struct batch b;
+	struct ff_batch_rays b;
 
 	for (uint32_t r = 0; r < FF_REPLICATES; r++) {
 		struct scramble s = scramble(j, 2 * ps + (exponent >= 0), r);
-		for (uint32_t first = 0; first < each; first += FF_BATCH) {
-			uint32_t n = each - first < FF_BATCH ? each - first : FF_BATCH;
-			ff_batch_numbers(j, s.seed, first, n, &b.rays);
-			ff_batch_origins(j, ps, n, &b.rays);
+		for (uint32_t first = 0; first < each; first += RAY_BATCH) {
+			uint32_t n = each - first < RAY_BATCH ? each - first : RAY_BATCH;
+			ff_batch_numbers(&j->of_rows, s.seed, first, n, &b);
+			ff_batch_elements(j, ps >> 1, n, &b);
+			ff_batch_origins(j, (int)(ps & 1), n, &b);
 			if (exponent < 0)
-				ff_batch_directions(j, ps, n, &b.rays);
+				ff_batch_directions(j, (int)(ps & 1), n, &b);
 			else
-				lobe_directions(j, ps, exponent, n, &b.rays);
-			batch_cast(j, n, &b);
+				lobe_directions(j, ps, exponent, n, &b);
+			ff_batch_cast(j, n, &b);
 			batch_land(t, (int)(ps & 1), n, &b);
 		}
 		tally_replicate(&t->tally);
 	}
 }
 
+void ff_lobes_cast(struct ff_thread *t)
+{
+	ff_batch_cast(t->job, t->lobes, &t->lobe);
+	batch_land(t, 0, t->lobes, &t->lobe);
+	t->lobes = 0;
+}
+
 static void cast_lobe_ray(struct ff_thread *t, const struct capture *c, int side,
                           const double dir[3], double w)
 {
+	struct ray_units units = ray_units(t->job->rays);
 	double n[3], x[3] = { c->x[0], c->x[1], c->x[2] };
 
 	ff_normal(t->job, c->element, side, n);
 	ray_leave(t->job->rays, n, x);
-	ff_follow(t, x, dir, w, 0);
+	if (w != 1) {
+		ff_follow(t, x, dir, w, 0);
+		return;
+	}
+	for (int k = 0; k < 3; k++) {
+		t->lobe.ray.org[k][t->lobes] = (float)((x[k] - units.centre[k]) * units.per_unit);
+		t->lobe.ray.dir[k][t->lobes] = (float)dir[k];
+	}
+	if (++t->lobes == RAY_BATCH)
+		ff_lobes_cast(t);
+}
+
+/* The diffuse row of a patch-side into the tally: its own rays, where it needs them, and
+ * what was gathered of it, where that is better. */
+static struct ff_weight diffuse(struct ff_thread *t, uint32_t ps)
+{
+	const struct ff_job *j = t->job;
+	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
+	struct ff_weight w = { rays, rays };
+	int gathered = j->gather.rays && j->shoots_diffuse[ps];
+	int alone = gathered && ff_row_is_gathered(j, ps);
+
+	if (alone && ff_redistribute(t, ps, 0, &w))
+		return w;
+	t->capturing = j->has_lobe[ps];
+	t->capture_weight = 1;
+	cast(t, ps, rays, -1);
+	t->capturing = 0;
+	if (gathered && !alone)
+		ff_redistribute(t, ps, rays, &w);
+	return w;
 }
 
 static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struct err *e)
@@ -288,13 +359,10 @@ static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struc
 	t->rng = rng_seed(j->o.seed, ps);
 	t->captures.n = 0;
 	if (j->shoots_diffuse[ps] || j->has_lobe[ps]) {
-		t->capturing = j->has_lobe[ps];
-		t->capture_weight = 1;
-		cast(t, ps, rays, -1);
-		t->capturing = 0;
+		struct ff_weight w = diffuse(t, ps);
 		struct ff_batch unused = { 0 };
 		if (tally_finish(&t->tally, j->shoots_diffuse[ps] ? b : &unused, ps, FF_DIFFUSE,
-		                 rays, rays, e))
+		                 w.samples, w.total, e))
 			return -1;
 		batch_free(&unused);
 	}

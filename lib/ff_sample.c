@@ -1,35 +1,51 @@
 /* Where the rays of a row begin and go. The loops over a batch are written without
  * branches and calls, so that compilers turn them into vector code. */
 #include <math.h>
+#include <string.h>
 
 #include "ff_job.h"
 #include "vec3.h"
 
 #define PI 3.14159265358979323846
 
+static void fill_element(const struct ff_job *j, uint32_t i)
+{
+	const struct model *m = j->m;
+	struct ff_element *el = &j->element[i];
+	const uint32_t *c = &m->element[3 * (size_t)i];
+	const double *a = &m->vertex[3 * (size_t)c[0]];
+	const double *normal = &m->element_normal[3 * (size_t)i];
+	/* Clear of walls along the edges by a few float32 steps of the scene, but never
+	 * far from where the sample belongs. */
+	double inset = fmin(.2, 4 * ray_offset(j->rays) / sqrt(m->element_area[i]));
+	double tangent[2][3];
+
+	v3_frame(normal, tangent[0], tangent[1]);
+	for (int k = 0; k < 2; k++)
+		v3_sub(&m->vertex[3 * (size_t)c[k + 1]], a, el->edge[k]);
+	for (int k = 0; k < 3; k++) {
+		el->corner[k] = a[k] + inset / 3 * (el->edge[0][k] + el->edge[1][k]);
+		el->edge[0][k] *= 1 - inset;
+		el->edge[1][k] *= 1 - inset;
+		el->normal[k] = (float)normal[k];
+		el->tangent[0][k] = (float)tangent[0][k];
+		el->tangent[1][k] = (float)tangent[1][k];
+	}
+}
+
 void ff_element_table(struct ff_job *j)
 {
 	const struct model *m = j->m;
 
 	for (size_t p = 0; p < m->patches; p++) {
-		double sum = 0;
+		double sum = 0, scale = 0x1p32 / m->patch_area[p];
 		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++) {
 			struct ff_element *el = &j->element[i];
-			const uint32_t *c = &m->element[3 * (size_t)i];
-			const double *a = &m->vertex[3 * (size_t)c[0]];
-			/* Clear of walls along the edges by a few float32 steps of the
-			 * scene, but never far from where the sample belongs. */
-			double inset = fmin(.2, 4 * ray_offset(j->rays) / sqrt(m->element_area[i]));
+			fill_element(j, i);
+			el->before = (uint32_t)fmin(0xffffffffu, sum * scale);
+			el->per_part = (float)(1 / (m->element_area[i] * scale));
 			el->cdf = sum += m->element_area[i];
 			el->per_area = 1 / m->element_area[i];
-			for (int k = 0; k < 2; k++)
-				v3_sub(&m->vertex[3 * (size_t)c[k + 1]], a, el->edge[k]);
-			for (int k = 0; k < 3; k++) {
-				el->corner[k] = a[k] + inset / 3 * (el->edge[0][k] + el->edge[1][k]);
-				el->edge[0][k] *= 1 - inset;
-				el->edge[1][k] *= 1 - inset;
-			}
-			v3_frame(&m->element_normal[3 * (size_t)i], el->tangent[0], el->tangent[1]);
 		}
 	}
 }
@@ -71,70 +87,130 @@ uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, 
 	return i;
 }
 
-void ff_batch_numbers(const struct ff_job *j, const uint32_t seed[4], uint32_t first,
+void ff_batch_numbers(const struct ff_samples *s, const uint32_t seed[4], uint32_t first,
                       uint32_t n, struct ff_batch_rays *b)
 {
-	uint32_t bits[4][FF_BATCH] = { { 0 } };
+	uint32_t bits[RAY_BATCH] = { 0 };
 
-	for (uint32_t i = 0; i < n; i++)
-		for (int d = 0; d < 4; d++)
-			bits[d][i] = first + i < j->sobol_points
-			           ? j->sobol[(size_t)(first + i) * FF_DIMS + (size_t)d]
-			           : rng_sobol_bits(first + i, d);
-	for (int d = 0; d < 4; d++)
-		for (int i = 0; i < FF_BATCH; i++)
-			b->u[d][i] = rng_scramble(bits[d][i], seed[d]);
-}
-
-void ff_batch_origins(const struct ff_job *j, uint32_t ps, uint32_t n, struct ff_batch_rays *b)
-{
-	double off = ray_offset(j->rays) * (ps & 1 ? -1 : 1);
-
-	for (uint32_t i = 0; i < n; i++)
-		b->element[i] = choose(j, ps >> 1, &b->u[0][i]);
-	for (uint32_t i = 0; i < n; i++) {
-		const struct ff_element *el = &j->element[b->element[i]];
-		const double *normal = &j->m->element_normal[3 * (size_t)b->element[i]];
-		double r = sqrt(b->u[0][i]), w1 = r * (1 - b->u[1][i]), w2 = r * b->u[1][i];
-		for (int k = 0; k < 3; k++)
-			b->org[k][i] = el->corner[k] + w1 * el->edge[0][k] + w2 * el->edge[1][k] +
-			               off * normal[k];
+	for (int d = 0; d < 4; d++) {
+		uint32_t known = first < s->n ? s->n - first : 0;
+		known = known < n ? known : n;
+		if (known)
+			memcpy(bits, &s->bits[(size_t)d * s->n + first], known * sizeof *bits);
+		for (uint32_t i = known; i < n; i++)
+			bits[i] = rng_sobol_bits(first + i, d);
+		for (int i = 0; i < RAY_BATCH; i++)
+			bits[i] = rng_scramble_bits(bits[i], seed[d]);
+		if (d == 0)
+			memcpy(b->choice, bits, sizeof b->choice);
+		for (int i = 0; i < RAY_BATCH; i++)
+			b->u[d][i] = (float)(int32_t)(bits[i] >> 8) * 0x1p-24f;
 	}
 }
 
-/* Cosine and sine of 2 pi u for a batch, to 1e-11, by Taylor series at the half angle. */
-static void turns(const double *u, double *x, double *y)
+/* The last element whose share begins at or before the number: for few elements by
+ * counting, all rays at once; for many by binary search. */
+static void count_choices(const struct ff_element *el, uint32_t elements, struct ff_batch_rays *b)
 {
-	for (int i = 0; i < FF_BATCH; i++) {
-		double h = PI * u[i] - PI / 2, q = h * h;
-		double s = h * (1 + q * (-1. / 6 + q * (1. / 120 + q * (-1. / 5040 +
-		           q * (1. / 362880 + q * (-1. / 39916800 + q * (1. / 6227020800. +
-		           q * (-1. / 1307674368000.))))))));
-		double c = 1 + q * (-1. / 2 + q * (1. / 24 + q * (-1. / 720 + q * (1. / 40320 +
-		           q * (-1. / 3628800 + q * (1. / 479001600. + q * (-1. / 87178291200. +
-		           q * (1. / 20922789888000.))))))));
+	for (int i = 0; i < RAY_BATCH; i++)
+		b->element[i] = 0;
+	for (uint32_t k = 1; k < elements; k++) {
+		uint32_t before = el[k].before;
+		for (int i = 0; i < RAY_BATCH; i++)
+			b->element[i] += b->choice[i] >= before;
+	}
+}
+
+static void search_choices(const struct ff_element *el, uint32_t elements, uint32_t n,
+                           struct ff_batch_rays *b)
+{
+	for (uint32_t i = 0; i < n; i++) {
+		uint32_t lo = 0, left = elements;
+		while (left > 1) {
+			uint32_t half = left / 2;
+			lo += el[lo + half].before <= b->choice[i] ? half : 0;
+			left -= half;
+		}
+		b->element[i] = lo;
+	}
+}
+
+void ff_batch_elements(const struct ff_job *j, uint32_t patch, uint32_t n,
+                       struct ff_batch_rays *b)
+{
+	enum { FEW = 24 };
+	uint32_t first = j->m->patch_start[patch], elements = j->m->patch_start[patch + 1] - first;
+	const struct ff_element *el = &j->element[first];
+
+	if (elements <= FEW)
+		count_choices(el, elements, b);
+	else
+		search_choices(el, elements, n, b);
+	for (uint32_t i = 0; i < n; i++) {
+		const struct ff_element *chosen = &el[b->element[i]];
+		float left = (float)(b->choice[i] - chosen->before) * chosen->per_part;
+		b->u[0][i] = left < 1 ? left : 1;
+		b->element[i] += first;
+	}
+}
+
+/* Vectors of a struct ff_element; the fourth lane idles. */
+typedef double d4 __attribute__((vector_size(32), aligned(8), may_alias));
+typedef float f4 __attribute__((vector_size(16), aligned(4), may_alias));
+
+void ff_batch_origins(const struct ff_job *j, int side, uint32_t n, struct ff_batch_rays *b)
+{
+	struct ray_units units = ray_units(j->rays);
+	double off = ray_offset(j->rays) * (side ? -1 : 1);
+	d4 centre = { units.centre[0], units.centre[1], units.centre[2], 0 };
+	float w1[RAY_BATCH], w2[RAY_BATCH];
+
+	for (int i = 0; i < RAY_BATCH; i++) {
+		float r = sqrtf(b->u[0][i]);
+		w2[i] = r * b->u[1][i];
+		w1[i] = r - w2[i];
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		const struct ff_element *el = &j->element[b->element[i]];
+		d4 x = *(const d4 *)el->corner - centre;
+		x += (double)w1[i] * *(const d4 *)el->edge[0] + (double)w2[i] * *(const d4 *)el->edge[1];
+		x += off * __builtin_convertvector(*(const f4 *)el->normal, d4);
+		f4 out = __builtin_convertvector(x * units.per_unit, f4);
+		for (int k = 0; k < 3; k++)
+			b->ray.org[k][i] = out[k];
+	}
+}
+
+/* Cosine and sine of 2 pi u for a batch, to 2e-7, by Taylor series at the half angle. */
+static void turns(const float *u, float *x, float *y)
+{
+	for (int i = 0; i < RAY_BATCH; i++) {
+		float h = (float)PI * u[i] - (float)(PI / 2), q = h * h;
+		float s = h * (1 + q * (-1.f / 6 + q * (1.f / 120 + q * (-1.f / 5040 +
+		          q * (1.f / 362880 + q * (-1.f / 39916800))))));
+		float c = 1 + q * (-1.f / 2 + q * (1.f / 24 + q * (-1.f / 720 + q * (1.f / 40320 +
+		          q * (-1.f / 3628800 + q * (1.f / 479001600))))));
 		x[i] = 2 * s * s - 1;
 		y[i] = -2 * s * c;
 	}
 }
 
-void ff_batch_directions(const struct ff_job *j, uint32_t ps, uint32_t n,
-                         struct ff_batch_rays *b)
+void ff_batch_directions(const struct ff_job *j, int side, uint32_t n, struct ff_batch_rays *b)
 {
-	double x[FF_BATCH], y[FF_BATCH], z[FF_BATCH], side = ps & 1 ? -1 : 1;
+	float x[RAY_BATCH], y[RAY_BATCH], z[RAY_BATCH], sign = side ? -1 : 1;
 
 	turns(b->u[3], x, y);
-	for (int i = 0; i < FF_BATCH; i++) {
-		double sine = sqrt(b->u[2][i]);
+	for (int i = 0; i < RAY_BATCH; i++) {
+		float sine = sqrtf(b->u[2][i]);
 		x[i] *= sine;
 		y[i] *= sine;
-		z[i] = side * sqrt(1 - b->u[2][i]);
+		z[i] = sign * sqrtf(1 - b->u[2][i]);
 	}
 	for (uint32_t i = 0; i < n; i++) {
 		const struct ff_element *el = &j->element[b->element[i]];
-		const double *normal = &j->m->element_normal[3 * (size_t)b->element[i]];
+		f4 d = x[i] * *(const f4 *)el->tangent[0] + y[i] * *(const f4 *)el->tangent[1] +
+		       z[i] * *(const f4 *)el->normal;
 		for (int k = 0; k < 3; k++)
-			b->dir[k][i] = x[i] * el->tangent[0][k] + y[i] * el->tangent[1][k] +
-			               z[i] * normal[k];
+			b->ray.dir[k][i] = d[k];
 	}
 }

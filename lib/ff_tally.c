@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "vec3.h"
+
 struct tally_far {
 	uint64_t key;      /* slot, patch-side, element in that order */
 	uint32_t column;
@@ -39,17 +41,53 @@ static uint32_t slot_of(struct tally *t, uint32_t chain)
 	return *slot - 1;
 }
 
-int tally_init(struct tally *t, const struct model *m, const uint8_t *has_lobe, struct err *e)
+int tally_places_init(struct tally_places *p, const struct model *m, const uint8_t *apart,
+                      struct err *e)
 {
-	*t = (struct tally){ .m = m, .has_lobe = has_lobe, .far_most = FAR_MOST };
+	uint32_t place = 0;
+
+	*p = (struct tally_places){ 0 };
+	if (m->elements >= TALLY_APART / 2)
+		return err_set(e, "more than %u elements", TALLY_APART / 2 - 1);
+	p->place = mem_new(2 * m->elements, sizeof *p->place, "order of elements", e);
+	p->column = mem_new(2 * m->elements, sizeof *p->column, "order of elements", e);
+	if (!p->place || !p->column)
+		return -1;
+	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
+		for (uint32_t el = m->patch_start[ps >> 1]; el < m->patch_start[(ps >> 1) + 1]; el++) {
+			uint32_t column = 2 * el + (ps & 1);
+			p->place[column] = place | (apart[ps] ? TALLY_APART : 0);
+			p->column[place++] = column;
+		}
+	return 0;
+}
+
+void tally_places_free(struct tally_places *p)
+{
+	free(p->place);
+	free(p->column);
+	*p = (struct tally_places){ 0 };
+}
+
+int tally_init(struct tally *t, const struct model *m, const struct tally_places *places,
+               const uint8_t *has_lobe, struct err *e)
+{
+	size_t sides = 2 * m->elements;
+
+	*t = (struct tally){ .m = m, .places = places, .has_lobe = has_lobe,
+	                     .far_most = FAR_MOST, .words = (sides + 4095) / 4096 };
 	if (chains_init(&t->chains, m, e))
 		return -1;
-	t->dense = mem_new(2 * m->elements, sizeof *t->dense, "row tally", e);
+	t->count = mem_new(sides, sizeof *t->count, "row tally", e);
+	t->dense = mem_new(sides, sizeof *t->dense, "row tally", e);
+	t->seen = mem_new(64 * t->words, sizeof *t->seen, "row tally", e);
+	t->words_seen = mem_new(t->words, sizeof *t->words_seen, "row tally", e);
 	t->replicate = mem_new(2 * m->patches, sizeof *t->replicate, "row tally", e);
 	t->square = mem_new(2 * m->patches, sizeof *t->square, "row tally", e);
-	t->words = (2 * m->patches + 63) / 64;
-	t->seen = mem_new(t->words, sizeof *t->seen, "row tally", e);
-	if (!t->dense || !t->replicate || !t->square || !t->seen)
+	t->variance = mem_new(2 * m->patches, sizeof *t->variance, "row tally", e);
+	t->toward = mem_new(2 * m->patches, sizeof *t->toward, "row tally", e);
+	if (!t->count || !t->dense || !t->seen || !t->words_seen || !t->replicate ||
+	    !t->square || !t->variance || !t->toward)
 		return -1;
 	slot_of(t, 0); /* chain 0 is slot 0 of every row */
 	return t->err.set ? err_set(e, "%s", t->err.text) : 0;
@@ -57,8 +95,8 @@ int tally_init(struct tally *t, const struct model *m, const uint8_t *has_lobe, 
 
 void tally_free(struct tally *t)
 {
-	void *array[] = { t->dense, t->replicate, t->square, t->seen,
-		t->far.data, t->sort.data, t->rest.data, t->slot_chain.data,
+	void *array[] = { t->count, t->dense, t->seen, t->words_seen, t->replicate,
+		t->square, t->variance, t->toward, t->far.data, t->sort.data, t->rest.data, t->slot_chain.data,
 		t->chain_slot.data, t->arrival.data };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
@@ -141,42 +179,111 @@ static void note_arrival(struct tally *t, uint32_t chain, uint32_t target, doubl
 	vec_append(&t->arrival, &a, 1, sizeof a, &t->err);
 }
 
+static void hit_near(struct tally *t, uint32_t place, uint32_t ps, double w)
+{
+	if (w == 1) {
+		tally_count(t, place);
+		return;
+	}
+	t->weighed = 1;
+	t->dense[place] += w;
+	t->replicate[ps] += w;
+	tally_see(t, place);
+}
+
+static void hit_far(struct tally *t, uint32_t chain, uint32_t place, uint32_t element_side,
+                    double w)
+{
+	struct tally_far f = { slot_of(t, chain) * 2 * (uint64_t)t->m->elements + place,
+	                       element_side, w };
+
+	vec_append(&t->far, &f, 1, sizeof f, &t->err);
+	if (t->far.n >= t->far_most) {
+		merge_far(t, &t->err);
+		t->far_most = t->far.n > FAR_MOST / 2 ? 2 * t->far.n : FAR_MOST;
+	}
+}
+
 void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
                const double dir[3])
 {
-	uint32_t element = element_side >> 1, side = element_side & 1;
-	uint32_t p = t->m->element_patch[element], ps = 2 * p + side;
+	uint32_t ps = 2 * t->m->element_patch[element_side >> 1] + (element_side & 1);
+	uint32_t place = t->places->place[element_side] & ~TALLY_APART;
 
-	if (chain == 0) {
-		t->dense[element_side] += w;
-		t->replicate[ps] += w;
-		t->seen[ps >> 6] |= (uint64_t)1 << (ps & 63);
-	} else {
-		const uint32_t *start = t->m->patch_start;
-		uint64_t place = 2 * (uint64_t)start[p] + (element - start[p]) +
-		                 (side ? start[p + 1] - start[p] : 0);
-		struct tally_far f = { slot_of(t, chain) * 2 * (uint64_t)t->m->elements + place,
-		                       element_side, w };
-		vec_append(&t->far, &f, 1, sizeof f, &t->err);
-		if (t->far.n >= t->far_most) {
-			merge_far(t, &t->err);
-			t->far_most = t->far.n > FAR_MOST / 2 ? 2 * t->far.n : FAR_MOST;
-		}
-	}
-	if (t->has_lobe[ps])
+	if (chain)
+		hit_far(t, chain, place, element_side, w);
+	else
+		hit_near(t, place, ps, w);
+	if (!t->has_lobe[ps])
+		return;
+	if (chain)
 		note_arrival(t, chain, ps, w, dir);
+	else
+		v3_mad(t->toward[ps], -w, dir, t->toward[ps]);
+}
+
+uint32_t tally_next(const struct tally *t, uint64_t place)
+{
+	if (place >> 12 >= t->words)
+		return UINT32_MAX;
+	uint64_t bits = t->seen[place >> 6] >> (place & 63);
+	if (bits)
+		return (uint32_t)(place + (uint64_t)__builtin_ctzll(bits));
+	uint64_t word = (place >> 6) + 1;
+	bits = word & 63 ? t->words_seen[word >> 6] >> (word & 63) : 0;
+	if (!bits) {
+		for (word = (word + 63) & ~(uint64_t)63; word >> 6 < t->words; word += 64)
+			if ((bits = t->words_seen[word >> 6]))
+				break;
+		if (!bits)
+			return UINT32_MAX;
+	}
+	word += (uint64_t)__builtin_ctzll(bits);
+	return (uint32_t)(64 * word + (uint64_t)__builtin_ctzll(t->seen[word]));
+}
+
+double tally_counted(const struct tally *t, uint32_t place)
+{
+	double n = 0;
+
+	for (int r = 0; r < TALLY_REPLICATES; r++)
+		n += t->count[place][r];
+	return n;
+}
+
+void tally_set(struct tally *t, uint32_t place, double w, double variance)
+{
+	memset(t->count[place], 0, sizeof t->count[place]);
+	t->dense[place] = w;
+	t->variance[tally_side_at(t, place)] += variance;
+	tally_see(t, place);
+}
+
+uint32_t tally_side_at(const struct tally *t, uint32_t place)
+{
+	uint32_t column = t->places->column[place];
+
+	return 2 * t->m->element_patch[column >> 1] + (column & 1);
+}
+
+uint32_t tally_side_end(const struct tally *t, uint32_t ps)
+{
+	const uint32_t *start = &t->m->patch_start[ps >> 1];
+
+	return ps & 1 ? 2 * start[1] : start[0] + start[1];
 }
 
 void tally_replicate(struct tally *t)
 {
 	double escape = tally_rest(t, 0)->escape, now = escape - t->escape_before;
+	uint32_t place = tally_next(t, 0);
 
-	for (size_t word = 0; word < t->words; word++)
-		for (uint64_t left = t->seen[word]; left; left &= left - 1) {
-			size_t ps = 64 * word + (size_t)__builtin_ctzll(left);
-			t->square[ps] += t->replicate[ps] * t->replicate[ps];
-			t->replicate[ps] = 0;
-		}
+	while (t->weighed && place != UINT32_MAX) {
+		uint32_t ps = tally_side_at(t, place);
+		t->square[ps] += t->replicate[ps] * t->replicate[ps];
+		t->replicate[ps] = 0;
+		place = tally_next(t, tally_side_end(t, ps));
+	}
 	t->escape_square += now * now;
 	t->escape_before = escape;
 	t->replicates++;
@@ -212,36 +319,70 @@ static double share_variance(const struct tally *t, double sum, double square, d
 	return f * (1 - f) / samples;
 }
 
-/* Chain 0 on one patch-side: entries for the elements that were hit. Clears them. */
-static int finish_side(struct tally *t, struct ff_batch *b, uint32_t ps, uint32_t samples,
-                       double total, double *sum, double *variance, struct err *e)
+static int put_arrival(struct ff_batch *b, uint32_t target, const double toward[3],
+                       struct err *e)
 {
-	const uint32_t *start = &t->m->patch_start[ps >> 1];
-	double patch_sum = 0;
+	double l = v3_length(toward);
+	float f[3] = { 0, 0, 1 };
 
-	if (reserve(b, start[1] - start[0], e))
-		return -1;
-	for (uint32_t el = start[0]; el < start[1]; el++) {
-		double *w = &t->dense[2 * (size_t)el + (ps & 1)];
-		if (*w > 0)
-			*sum += put_value(b, 2 * el + (ps & 1), *w);
-		patch_sum += *w;
-		*w = 0;
-	}
-	*variance += share_variance(t, patch_sum, t->square[ps], total, samples);
-	t->square[ps] = t->replicate[ps] = 0;
-	return 0;
+	for (int k = 0; k < 3 && l > 0; k++)
+		f[k] = (float)(toward[k] / l);
+	return vec_append(&b->arrival_target, &target, 1, sizeof target, e) ||
+	       vec_append(&b->arrival_direction, f, 3, sizeof *f, e) ? -1 : 0;
 }
 
-static int finish_near(struct tally *t, struct ff_batch *b, uint32_t samples, double total,
-                       double *sum, double *variance, struct err *e)
+/* What a row adds up to. */
+struct finish {
+	uint32_t samples;
+	double total, sum, variance;
+};
+
+/* Chain 0 on one patch-side: entries for the elements that were hit, from `place` on.
+ * Clears them. */
+static int finish_side(struct tally *t, struct ff_batch *b, uint32_t ps, uint32_t place,
+                       struct finish *f, struct err *e)
 {
+	uint32_t end = tally_side_end(t, ps);
+	double part[TALLY_REPLICATES] = { 0 }, side_sum = 0, square = t->square[ps];
+
+	if (reserve(b, end - place, e))
+		return -1;
+	for (; place < end; place = tally_next(t, (uint64_t)place + 1)) {
+		double w = t->dense[place] + tally_counted(t, place);
+		for (int r = 0; r < TALLY_REPLICATES; r++)
+			part[r] += t->count[place][r];
+		if (w > 0)
+			f->sum += put_value(b, t->places->column[place], w);
+		side_sum += w;
+		t->dense[place] = 0;
+		memset(t->count[place], 0, sizeof t->count[place]);
+	}
+	for (int r = 0; r < TALLY_REPLICATES; r++)
+		square += part[r] * part[r];
+	f->variance += t->variance[ps] > 0 ? t->variance[ps] / (f->total * f->total)
+	             : share_variance(t, side_sum, square, f->total, f->samples);
+	t->square[ps] = t->replicate[ps] = t->variance[ps] = 0;
+	if (!t->has_lobe[ps])
+		return 0;
+	int bad = side_sum > 0 && put_arrival(b, ps, t->toward[ps], e);
+	memset(t->toward[ps], 0, sizeof t->toward[ps]);
+	return bad;
+}
+
+static int finish_near(struct tally *t, struct ff_batch *b, struct finish *f, struct err *e)
+{
+	uint32_t place = tally_next(t, 0);
+
+	while (place != UINT32_MAX) {
+		uint32_t ps = tally_side_at(t, place);
+		if (finish_side(t, b, ps, place, f, e))
+			return -1;
+		place = tally_next(t, tally_side_end(t, ps));
+	}
 	for (size_t word = 0; word < t->words; word++) {
-		for (uint64_t left = t->seen[word]; left; left &= left - 1)
-			if (finish_side(t, b, (uint32_t)(64 * word) + (uint32_t)__builtin_ctzll(left),
-			                samples, total, sum, variance, e))
-				return -1;
-		t->seen[word] = 0;
+		for (uint64_t left = t->words_seen[word]; left; left &= left - 1)
+			t->seen[64 * word + (size_t)__builtin_ctzll(left)] = 0;
+		t->words_seen[word] = 0;
 	}
 	return 0;
 }
@@ -254,7 +395,7 @@ static int by_target(const void *a, const void *b)
 	return (x->target > y->target) - (x->target < y->target);
 }
 
-/* Appends the mean directions of one slot's arrivals, which are sorted by slot
+/* Appends the mean directions of a longer chain's arrivals, which are sorted by slot
  * and target. */
 static int put_arrivals(struct tally *t, struct ff_batch *b, uint32_t slot, struct err *e)
 {
@@ -270,16 +411,10 @@ static int put_arrivals(struct tally *t, struct ff_batch *b, uint32_t slot, stru
 	}
 	while (i < n && a[i].slot == slot) {
 		uint32_t target = a[i].target;
-		double d[3] = { 0 }, l;
+		double d[3] = { 0 };
 		for (; i < n && a[i].slot == slot && a[i].target == target; i++)
-			for (int k = 0; k < 3; k++)
-				d[k] += a[i].dir[k];
-		l = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-		float f[3] = { 0, 0, 1 };
-		for (int k = 0; k < 3 && l > 0; k++)
-			f[k] = (float)(d[k] / l);
-		if (vec_append(&b->arrival_target, &target, 1, sizeof target, e) ||
-		    vec_append(&b->arrival_direction, f, 3, sizeof *f, e))
+			v3_mad(d, 1, a[i].dir, d);
+		if (put_arrival(b, target, d, e))
 			return -1;
 	}
 	return 0;
@@ -369,7 +504,7 @@ static void clear(struct tally *t)
 		((uint32_t *)t->chain_slot.data)[chain[s]] = 0;
 	t->slot_chain.n = t->rest.n = t->far.n = t->arrival.n = 0;
 	t->escape_before = t->escape_square = 0;
-	t->replicates = 0;
+	t->replicates = t->weighed = 0;
 	slot_of(t, 0);
 }
 
@@ -404,132 +539,19 @@ int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
                  enum ff_row_kind kind, uint32_t samples, double total, struct err *e)
 {
 	struct tally_rest *r = tally_rest(t, 0);
-	double sum = 0, variance = 0;
+	struct finish f = { .samples = samples, .total = total };
 
 	if (t->err.set)
 		return err_set(e, "%s", t->err.text);
-	if (put_zero_starts(b, e) || finish_near(t, b, samples, total, &sum, &variance, e))
+	if (put_zero_starts(b, e) || finish_near(t, b, &f, e))
 		return -1;
-	variance += share_variance(t, r->escape, t->escape_square, total, samples);
-	sum += r->escape + r->black + r->lost + r->cut;
+	f.variance += share_variance(t, r->escape, t->escape_square, total, samples);
+	f.sum += r->escape + r->black + r->lost + r->cut;
 	if (t->arrival.n)
 		qsort(t->arrival.data, t->arrival.n, sizeof(struct tally_arrival), by_target);
 	if (put_block(t, b, 0, e) || finish_far(t, b, e))
 		return -1;
 	clear(t);
-	return put_row(b, row_side, kind, samples, sum > 0 ? 1 / sum : 0, 1 - sum / total,
-	               sqrt(variance), e);
-}
-
-/* ---- batches ---- */
-
-static int map_chain(uint32_t *chain, const struct chains *local, struct vec *map,
-                     struct chains *whole, struct err *e)
-{
-	const uint32_t none = CHAIN_NONE;
-
-	while (map->n < local->n)
-		if (vec_append(map, &none, 1, sizeof none, e))
-			return -1;
-	uint32_t *to = (uint32_t *)map->data + *chain;
-	if (*to == CHAIN_NONE)
-		*to = chains_find(whole, chains_count(local, *chain), e);
-	*chain = *to;
-	return *to == CHAIN_NONE ? -1 : 0;
-}
-
-struct link {
-	uint32_t target, source, last, chain, row[2], order;
-	float direction[3];
-};
-
-static int by_link(const void *a, const void *b)
-{
-	const struct link *x = a, *y = b;
-	if (x->target != y->target)
-		return x->target < y->target ? -1 : 1;
-	if (x->chain != y->chain)
-		return x->chain < y->chain ? -1 : 1;
-	if (x->source != y->source)
-		return x->source < y->source ? -1 : 1;
-	return (x->order > y->order) - (x->order < y->order);
-}
-
-static int sort_links(struct ff_batch *b, struct err *e)
-{
-	size_t n = b->link_target.n;
-	struct link *l = mem_new(n, sizeof *l, "links", e);
-	uint32_t *target = b->link_target.data, *source = b->link_source.data;
-	uint32_t *last = b->link_last.data;
-	uint32_t *chain = b->link_chain.data, *row = b->link_row.data;
-	float *direction = b->link_direction.data;
-
-	if (!l)
-		return -1;
-	for (size_t i = 0; i < n; i++) {
-		l[i] = (struct link){ target[i], source[i], last[i], chain[i],
-		                      { row[2 * i], row[2 * i + 1] }, (uint32_t)i, { 0 } };
-		memcpy(l[i].direction, &direction[3 * i], sizeof l[i].direction);
-	}
-	if (n)
-		qsort(l, n, sizeof *l, by_link);
-	for (size_t i = 0; i < n; i++) {
-		target[i] = l[i].target;
-		source[i] = l[i].source;
-		last[i] = l[i].last;
-		chain[i] = l[i].chain;
-		memcpy(&row[2 * i], l[i].row, sizeof l[i].row);
-		memcpy(&direction[3 * i], l[i].direction, sizeof l[i].direction);
-	}
-	free(l);
-	return 0;
-}
-
-int batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *map,
-                   struct chains *whole, struct err *e)
-{
-	for (size_t i = 0; i < b->block_chain.n; i++)
-		if (map_chain((uint32_t *)b->block_chain.data + i, local, map, whole, e))
-			return -1;
-	for (size_t i = 0; i < b->link_chain.n; i++)
-		if (map_chain((uint32_t *)b->link_chain.data + i, local, map, whole, e))
-			return -1;
-	return sort_links(b, e);
-}
-
-struct ff batch_view(const struct ff_batch *b)
-{
-	struct ff f = {
-		.rows = b->row_side.n, .row_side = b->row_side.data,
-		.row_kind = b->row_kind.data, .row_samples = b->row_samples.data,
-		.row_scale = b->row_scale.data, .row_residual = b->row_residual.data,
-		.row_error = b->row_error.data, .row_block = b->row_block.data,
-		.blocks = b->block_chain.n, .block_chain = b->block_chain.data,
-		.block_start = b->block_start.data, .block_escape = b->escape.data,
-		.block_black = b->black.data, .block_lost = b->lost.data,
-		.block_cut = b->cut.data, .block_arrival = b->block_arrival.data,
-		.entries = b->column.n, .column = b->column.data,
-		.value = b->f64 ? NULL : b->value.data, .value64 = b->f64 ? b->value.data : NULL,
-		.arrivals = b->arrival_target.n, .arrival_target = b->arrival_target.data,
-		.arrival_direction = b->arrival_direction.data,
-		.links = b->link_target.n, .link_target = b->link_target.data,
-		.link_source = b->link_source.data, .link_last = b->link_last.data,
-		.link_chain = b->link_chain.data,
-		.link_direction = b->link_direction.data, .link_row = b->link_row.data,
-	};
-	return f;
-}
-
-void batch_free(struct ff_batch *b)
-{
-	struct vec *v[] = { &b->row_side, &b->row_kind, &b->row_samples, &b->row_scale,
-		&b->row_residual, &b->row_error, &b->row_block, &b->block_chain,
-		&b->block_start, &b->escape, &b->black, &b->lost, &b->cut, &b->block_arrival,
-		&b->column, &b->value, &b->arrival_target, &b->arrival_direction,
-		&b->link_target, &b->link_source, &b->link_last, &b->link_chain, &b->link_direction,
-		&b->link_row };
-
-	for (size_t i = 0; i < sizeof v / sizeof *v; i++)
-		free(v[i]->data);
-	*b = (struct ff_batch){ .f64 = b->f64 };
+	return put_row(b, row_side, kind, samples, f.sum > 0 ? 1 / f.sum : 0, 1 - f.sum / total,
+	               sqrt(f.variance), e);
 }

@@ -12,17 +12,34 @@ struct tally_rest {
 	double escape, black, lost, cut;
 };
 
+/* Element-sides in the order of a block's entries: by patch-side, then element. */
+struct tally_places {
+	uint32_t *place;           /* [2E] of an element-side; TALLY_APART may be set */
+	uint32_t *column;          /* [2E] element-side at a place */
+};
+
+/* A mark for element-sides where more happens than a count. */
+#define TALLY_APART 0x80000000u
+
+enum { TALLY_REPLICATES = 4 };
+
 /* One thread's scratch space; a row at a time. */
 struct tally {
 	const struct model *m;
+	const struct tally_places *places;
 	const uint8_t *has_lobe;   /* [2P] patch-sides whose arrivals keep a direction */
 	struct chains chains;      /* this thread's own numbering */
 
-	double *dense;             /* [2E] chain 0 */
-	double *replicate;         /* [2P] chain 0, the current replicate */
-	double *square;            /* [2P] sums of squares over replicates */
-	uint64_t *seen;            /* [words] bits of patch-sides seen in chain 0 */
-	size_t words;
+	/* Chain 0, by place: landings of weight 1 in each replicate, and other weights. */
+	uint32_t (*count)[TALLY_REPLICATES];
+	double *dense;
+	uint64_t *seen, *words_seen; /* bits of places with either, and of words of those */
+	size_t words;              /* of words_seen */
+	int weighed;               /* any other weights */
+	double *replicate;         /* [2P] other weights, the current replicate */
+	double *square;            /* [2P] their sums of squares over replicates */
+	double *variance;          /* [2P] of the summed weight, where tally_set gave it */
+	double (*toward)[3];       /* [2P] summed directions to where light comes from */
 	double escape_before, escape_square;
 	int replicates;
 
@@ -47,9 +64,29 @@ struct ff_batch {
 	struct vec link_target, link_source, link_last, link_chain, link_direction, link_row;
 };
 
-int tally_init(struct tally *t, const struct model *m, const uint8_t *has_lobe,
-               struct err *e);
+/* O(elements). Marks the element-sides of patch-sides with apart[] set. */
+int tally_places_init(struct tally_places *p, const struct model *m, const uint8_t *apart,
+                      struct err *e);
+void tally_places_free(struct tally_places *p);
+
+int tally_init(struct tally *t, const struct model *m, const struct tally_places *places,
+               const uint8_t *has_lobe, struct err *e);
 void tally_free(struct tally *t);
+
+static inline void tally_see(struct tally *t, uint32_t place)
+{
+	t->seen[place >> 6] |= (uint64_t)1 << (place & 63);
+	t->words_seen[place >> 12] |= (uint64_t)1 << (place >> 6 & 63);
+}
+
+/* A landing of weight 1 by chain 0 at a place without a lobe. */
+static inline void tally_count(struct tally *t, uint32_t place)
+{
+	int r = t->replicates < TALLY_REPLICATES ? t->replicates : TALLY_REPLICATES - 1;
+
+	t->count[place][r]++;
+	tally_see(t, place);
+}
 
 /* Weight w of the row's flux arriving by `chain` on an element-side, travelling
  * along dir (unit). */
@@ -59,6 +96,18 @@ void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
 /* What became of flux of `chain` that lands nowhere. The pointer is good until
  * the next call with a chain not seen in this row. */
 struct tally_rest *tally_rest(struct tally *t, uint32_t chain);
+
+/* The first place seen in chain 0 at or after `place`, or UINT32_MAX; the patch-side of
+ * a place, and the place after its last. */
+uint32_t tally_next(const struct tally *t, uint64_t place);
+uint32_t tally_side_at(const struct tally *t, uint32_t place);
+uint32_t tally_side_end(const struct tally *t, uint32_t patch_side);
+
+/* Landings of weight 1 tallied at a place. */
+double tally_counted(const struct tally *t, uint32_t place);
+
+/* Makes w, of that variance, the weight at a place in chain 0. */
+void tally_set(struct tally *t, uint32_t place, double w, double variance);
 
 /* Closes a replicate: equal, independently scrambled parts of a row's samples,
  * whose spread gives the row's standard error. */

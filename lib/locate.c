@@ -101,40 +101,57 @@ static int fill(struct locator *l, struct err *e)
 	int bad = 0;
 
 	for (uint32_t t = 0; !bad && t < l->m->triangles; t++) {
-		uint32_t n = l->size[t];
+		if (l->root[t] < 0)
+			continue;
+		const struct locator_grid *g = &l->grid[l->root[t]];
 		bad = fill_nodes(l, &stack, t, e);
-		for (uint32_t k = 0; !bad && k < n * n; k++)
-			l->cell[l->first[t] + k] = cell_node(l->m, t, n, k % n, k / n);
+		for (uint32_t k = 0; !bad && k < g->size * g->size; k++)
+			l->cell[g->first + k] = cell_node(l->m, t, g->size, k % g->size, k / g->size);
 	}
 	free(stack.data);
 	return bad;
 }
 
+/* Grids of the subdivided triangles; the others name their element. */
+static int lay_grids(struct locator *l, uint64_t *cells, struct err *e)
+{
+	const struct model *m = l->m;
+	uint32_t *elements = mem_new(m->triangles, sizeof *elements, "element lookup", e);
+	size_t grids = 0;
+
+	for (size_t i = 0; elements && i < m->elements; i++)
+		grids += elements[m->element_triangle[i]]++ == 1;
+	l->grid = mem_new(grids, sizeof *l->grid, "element lookup", e);
+	*cells = grids = 0;
+	for (size_t t = 0; elements && l->grid && t < m->triangles; t++) {
+		uint32_t n = grid_size(elements[t]);
+		l->root[t] = n ? (int32_t)grids : m->triangle_split[t];
+		if (!n)
+			continue;
+		l->grid[grids++] = (struct locator_grid){ *cells, n };
+		*cells += (uint64_t)n * n;
+	}
+	free(elements);
+	return elements && l->grid ? 0 : -1;
+}
+
 int locator_init(struct locator *l, const struct model *m, struct err *e)
 {
-	uint64_t cells = 0;
+	uint64_t cells;
 
 	*l = (struct locator){ .m = m };
-	l->first = mem_new(m->triangles, sizeof *l->first, "element lookup", e);
-	l->size = mem_new(m->triangles, sizeof *l->size, "element lookup", e);
+	l->root = mem_new(m->triangles, sizeof *l->root, "element lookup", e);
 	l->node = mem_new(m->splits, sizeof *l->node, "element lookup", e);
-	if (!l->first || !l->size || !l->node)
+	if (!l->root || !l->node || lay_grids(l, &cells, e))
 		return -1;
-	for (size_t i = 0; i < m->elements; i++)
-		l->size[m->element_triangle[i]]++;
-	for (size_t t = 0; t < m->triangles; t++) {
-		l->size[t] = grid_size(l->size[t]);
-		l->first[t] = cells;
-		cells += (uint64_t)l->size[t] * l->size[t];
-	}
 	l->cell = mem_new(cells, sizeof *l->cell, "element lookup", e);
 	return l->cell ? fill(l, e) : -1;
 }
 
 void locator_free(struct locator *l)
 {
-	free(l->first);
-	free(l->size);
+	free(l->root);
+	free(l->grid);
 	free(l->cell);
 	free(l->node);
 	*l = (struct locator){ 0 };

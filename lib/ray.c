@@ -26,11 +26,16 @@ struct ray_scene {
 	double unit;        /* world length of one unit inside */
 	double per_unit;    /* 1 / unit */
 	float (*normal)[3]; /* [triangles] front normals */
+	int coherent;       /* packets of neighbouring rays pay as packets */
 };
 
 /* Origins leave surfaces by 8 float32 steps at unit scale: rounding of the
  * vertices, of the origin and of the plane together stay below 4. */
 static const double offset_units = 0x1p-21;
+
+/* Up to how many triangles a packet of rays with similar directions is best traced as
+ * one; in larger scenes its rays part too soon. */
+enum { COHERENT_MOST = 1000 };
 
 static void bounds(const struct model *m, struct ray_scene *s)
 {
@@ -92,6 +97,7 @@ struct ray_scene *ray_scene_new(const struct model *m, struct err *e)
 	if (!s)
 		return NULL;
 	bounds(m, s);
+	s->coherent = m->triangles <= COHERENT_MOST;
 	s->normal = mem_new(m->triangles, sizeof *s->normal, "triangle normals", e);
 	s->device = rtcNewDevice(NULL);
 	if (s->normal && s->device) {
@@ -176,6 +182,73 @@ void ray_nearest(const struct ray_scene *s, const double org[3], const double di
 	hit->w[1] = (double)r.hit.u;
 	hit->w[2] = (double)r.hit.v;
 	hit->w[0] = 1 - hit->w[1] - hit->w[2];
+}
+
+struct ray_units ray_units(const struct ray_scene *s)
+{
+	return (struct ray_units){ { s->centre[0], s->centre[1], s->centre[2] }, s->per_unit };
+}
+
+enum { PACKET = 8 };
+
+/* The parts of a packet that no ray changes, and those that a cast has changed. */
+static void packet_begin(struct RTCRayHit8 *p)
+{
+	for (int i = 0; i < PACKET; i++) {
+		p->ray.tnear[i] = 0;
+		p->ray.time[i] = 0;
+		p->ray.tfar[i] = INFINITY;
+		p->ray.mask[i] = 0xffffffffu;
+		p->ray.id[i] = 0;
+		p->ray.flags[i] = 0;
+		p->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+		p->hit.primID[i] = RTC_INVALID_GEOMETRY_ID;
+		p->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+	}
+}
+
+static void packet_cast(const struct ray_scene *s, struct ray_batch *b, uint32_t at, uint32_t n)
+{
+	struct RTCRayHit8 p;
+	int valid[PACKET] __attribute__((aligned(32)));
+	float *to[6] = { p.ray.org_x, p.ray.org_y, p.ray.org_z, p.ray.dir_x, p.ray.dir_y,
+		p.ray.dir_z };
+
+	packet_begin(&p);
+	for (uint32_t i = 0; i < PACKET; i++)
+		valid[i] = i < n ? -1 : 0;
+	for (int k = 0; k < 3; k++) {
+		memcpy(to[k], &b->org[k][at], sizeof p.ray.org_x);
+		memcpy(to[3 + k], &b->dir[k][at], sizeof p.ray.dir_x);
+	}
+#if EMBREE >= 4
+	struct RTCIntersectArguments arguments;
+	rtcInitIntersectArguments(&arguments);
+	arguments.flags = s->coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
+	rtcIntersect8(valid, s->scene, &p, &arguments);
+#else
+	struct RTCIntersectContext context;
+	rtcInitIntersectContext(&context);
+	context.flags = s->coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+	                            : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+	rtcIntersect8(valid, s->scene, &context, &p);
+#endif
+	memcpy(&b->triangle[at], p.hit.primID, sizeof p.hit.primID);
+	memcpy(&b->w[0][at], p.hit.u, sizeof p.hit.u);
+	memcpy(&b->w[1][at], p.hit.v, sizeof p.hit.v);
+}
+
+void ray_nearest_batch(const struct ray_scene *s, struct ray_batch *b, uint32_t n)
+{
+	for (uint32_t i = 0; i < n; i += PACKET)
+		packet_cast(s, b, i, n - i);
+	for (uint32_t i = 0; i < n; i++) {
+		if (b->triangle[i] == RAY_MISS)
+			continue;
+		const float *normal = s->normal[b->triangle[i]];
+		b->side[i] = normal[0] * b->dir[0][i] + normal[1] * b->dir[1][i] +
+		             normal[2] * b->dir[2][i] > 0;
+	}
 }
 
 int ray_blocked(const struct ray_scene *s, const double a[3], const double b[3])

@@ -35,6 +35,26 @@ void ray_leave(const struct ray_scene *s, const double n[3], double x[3]);
 void ray_nearest(const struct ray_scene *s, const double org[3], const double dir[3],
                  struct ray_hit *hit);
 
+/* Rays by the batch. Origins in the units of the inside: (world - centre) per_unit. */
+enum { RAY_BATCH = 64 };
+
+struct ray_units {
+	double centre[3], per_unit;
+};
+
+struct ray_batch {
+	float org[3][RAY_BATCH], dir[3][RAY_BATCH]; /* directions unit */
+	uint32_t triangle[RAY_BATCH];               /* hit, or RAY_MISS */
+	uint32_t side[RAY_BATCH];
+	float w[2][RAY_BATCH];                      /* barycentric weights of corners 1, 2 */
+};
+
+struct ray_units ray_units(const struct ray_scene *s);
+
+/* Nearest hits of rays [0, n). Which of surfaces at equal distance is found may differ
+ * from ray_nearest's choice. */
+void ray_nearest_batch(const struct ray_scene *s, struct ray_batch *b, uint32_t n);
+
 /* 1 if anything stands between a and b (points already moved off their
  * surfaces with ray_leave). */
 int ray_blocked(const struct ray_scene *s, const double a[3], const double b[3]);

@@ -58,7 +58,7 @@ static inline uint32_t rng_reverse_bits(uint32_t x)
 	return ((x & 0x55555555u) << 1) | ((x >> 1) & 0x55555555u);
 }
 
-static inline double rng_scramble(uint32_t bits, uint32_t seed)
+static inline uint32_t rng_scramble_bits(uint32_t bits, uint32_t seed)
 {
 	uint32_t x = bits;
 	/* Each output bit depends only on the lower input bits: a nested
@@ -68,7 +68,12 @@ static inline double rng_scramble(uint32_t bits, uint32_t seed)
 	x *= (seed >> 16) | 1;
 	x ^= x * 0x05526c56u;
 	x ^= x * 0x53a22864u;
-	return (double)rng_reverse_bits(x) * 0x1p-32;
+	return rng_reverse_bits(x);
+}
+
+static inline double rng_scramble(uint32_t bits, uint32_t seed)
+{
+	return (double)rng_scramble_bits(bits, seed) * 0x1p-32;
 }
 
 #endif

@@ -13,7 +13,8 @@
 #include "../lib/ff_build.h"
 #include "common/cli.h"
 
-enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GAIN, OPT_TO };
+enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GAIN, OPT_GATHER,
+       OPT_TO };
 
 static const struct cli_option options[] = {
 	{ 'o', "output", "FILE", "write the form factors to FILE (.ff)" },
@@ -23,6 +24,7 @@ static const struct cli_option options[] = {
 	{ 't', "target", "X", "analytic: absolute error of a factor that is partly hidden (default 1e-6)" },
 	{ OPT_TO, "to", "WHAT", "elements or patches: what receives (default elements)" },
 	{ OPT_GAIN, "emitter-gain", "N", "times as many rays for emitters (default 8)" },
+	{ OPT_GATHER, "gather", "N", "rays an element-side gathers with (default a sixteenth of -n)" },
 	{ OPT_LOBE_RAYS, "lobe-rays", "N", "rays a patch-side for each directional lobe (default 4096)" },
 	{ OPT_DEPTH, "depth", "N", "most ideal mirrors and panes a ray is followed through (default 256)" },
 	{ OPT_PRECISION, "precision", "TYPE", "f32 or f64 (default f32)" },
@@ -69,7 +71,7 @@ static enum ff_method parse_method(const struct cli *c, const char *text)
 static void parse(struct cli *c, int argc, char **argv, struct request *r)
 {
 	int letter;
-	long n = 0;
+	long n = 0, gather = -1;
 	struct ff_options *o = &r->ff;
 
 	*o = (struct ff_options){ .points = 16, .emitter_gain = 8, .lobe_rays = 4096, .depth = 256,
@@ -83,6 +85,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		case 'n': n = cli_integer(c, "--samples", optarg, 4, 1 << 26); break;
 		case 'p': o->points = (uint32_t)cli_integer(c, "--points", optarg, 1, 4096); break;
 		case OPT_GAIN: o->emitter_gain = (uint32_t)cli_integer(c, "--emitter-gain", optarg, 1, 4096); break;
+		case OPT_GATHER: gather = cli_integer(c, "--gather", optarg, 0, 1 << 20); break;
 		case OPT_LOBE_RAYS: o->lobe_rays = (uint32_t)cli_integer(c, "--lobe-rays", optarg, 1, 1 << 26); break;
 		case OPT_DEPTH: o->depth = (uint32_t)cli_integer(c, "--depth", optarg, 0, 1000000); break;
 		case OPT_PRECISION: parse_word(c, "--precision", optarg, "f64", "f32", &o->f64); break;
@@ -101,6 +104,8 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		cli_usage(c, "--samples %u: a hemicube's resolution is even and at most 8192", o->rays);
 	if (!hemicube)
 		o->rays = (o->rays + 3) / 4 * 4;
+	if (!hemicube)
+		o->gather = gather >= 0 ? (uint32_t)gather : o->rays >= 256 ? o->rays / 16 : 0;
 	o->threads = c->threads;
 }
 
@@ -113,6 +118,8 @@ static json_t *options_json(const struct ff_options *o)
 		"precision", o->f64 ? "f64" : "f32",
 		"part", (json_int_t)o->part, "parts", (json_int_t)o->parts);
 
+	if (o->method == FF_RAYS)
+		json_object_set_new(j, "gather", json_integer(o->gather));
 	json_object_set_new(j, "emitter_gain", json_integer(o->emitter_gain));
 	if (o->to_patches)
 		json_object_set_new(j, "to", json_string("patches"));

@@ -24,7 +24,7 @@ static void agree(struct model *m, double patch, double element)
 		uint32_t t = (uint32_t)(rng_next(&r) % m->triangles);
 		double a = sqrt(rng_uniform(&r)), b = rng_uniform(&r);
 		double w[3] = { 1 - a, a * (1 - b), a * b }, tree[3] = { w[0], w[1], w[2] };
-		uint32_t found = locate(&l, t, w);
+		uint32_t found = locate(&l, t, (float)w[1], (float)w[2]);
 		assert_int_equal(m->element_triangle[found], t);
 		other += found != model_locate(m, t, tree);
 	}

@@ -1,0 +1,116 @@
+/* Batches of rows: chain numbers and links made those of the whole. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "ff_tally.h"
+
+static int map_chain(uint32_t *chain, const struct chains *local, struct vec *map,
+                     struct chains *whole, struct err *e)
+{
+	const uint32_t none = CHAIN_NONE;
+
+	while (map->n < local->n)
+		if (vec_append(map, &none, 1, sizeof none, e))
+			return -1;
+	uint32_t *to = (uint32_t *)map->data + *chain;
+	if (*to == CHAIN_NONE)
+		*to = chains_find(whole, chains_count(local, *chain), e);
+	*chain = *to;
+	return *to == CHAIN_NONE ? -1 : 0;
+}
+
+struct link {
+	uint32_t target, source, last, chain, row[2], order;
+	float direction[3];
+};
+
+static int by_link(const void *a, const void *b)
+{
+	const struct link *x = a, *y = b;
+	if (x->target != y->target)
+		return x->target < y->target ? -1 : 1;
+	if (x->chain != y->chain)
+		return x->chain < y->chain ? -1 : 1;
+	if (x->source != y->source)
+		return x->source < y->source ? -1 : 1;
+	return (x->order > y->order) - (x->order < y->order);
+}
+
+static int sort_links(struct ff_batch *b, struct err *e)
+{
+	size_t n = b->link_target.n;
+	struct link *l = mem_new(n, sizeof *l, "links", e);
+	uint32_t *target = b->link_target.data, *source = b->link_source.data;
+	uint32_t *last = b->link_last.data;
+	uint32_t *chain = b->link_chain.data, *row = b->link_row.data;
+	float *direction = b->link_direction.data;
+
+	if (!l)
+		return -1;
+	for (size_t i = 0; i < n; i++) {
+		l[i] = (struct link){ target[i], source[i], last[i], chain[i],
+		                      { row[2 * i], row[2 * i + 1] }, (uint32_t)i, { 0 } };
+		memcpy(l[i].direction, &direction[3 * i], sizeof l[i].direction);
+	}
+	if (n)
+		qsort(l, n, sizeof *l, by_link);
+	for (size_t i = 0; i < n; i++) {
+		target[i] = l[i].target;
+		source[i] = l[i].source;
+		last[i] = l[i].last;
+		chain[i] = l[i].chain;
+		memcpy(&row[2 * i], l[i].row, sizeof l[i].row);
+		memcpy(&direction[3 * i], l[i].direction, sizeof l[i].direction);
+	}
+	free(l);
+	return 0;
+}
+
+int batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *map,
+                   struct chains *whole, struct err *e)
+{
+	for (size_t i = 0; i < b->block_chain.n; i++)
+		if (map_chain((uint32_t *)b->block_chain.data + i, local, map, whole, e))
+			return -1;
+	for (size_t i = 0; i < b->link_chain.n; i++)
+		if (map_chain((uint32_t *)b->link_chain.data + i, local, map, whole, e))
+			return -1;
+	return sort_links(b, e);
+}
+
+struct ff batch_view(const struct ff_batch *b)
+{
+	struct ff f = {
+		.rows = b->row_side.n, .row_side = b->row_side.data,
+		.row_kind = b->row_kind.data, .row_samples = b->row_samples.data,
+		.row_scale = b->row_scale.data, .row_residual = b->row_residual.data,
+		.row_error = b->row_error.data, .row_block = b->row_block.data,
+		.blocks = b->block_chain.n, .block_chain = b->block_chain.data,
+		.block_start = b->block_start.data, .block_escape = b->escape.data,
+		.block_black = b->black.data, .block_lost = b->lost.data,
+		.block_cut = b->cut.data, .block_arrival = b->block_arrival.data,
+		.entries = b->column.n, .column = b->column.data,
+		.value = b->f64 ? NULL : b->value.data, .value64 = b->f64 ? b->value.data : NULL,
+		.arrivals = b->arrival_target.n, .arrival_target = b->arrival_target.data,
+		.arrival_direction = b->arrival_direction.data,
+		.links = b->link_target.n, .link_target = b->link_target.data,
+		.link_source = b->link_source.data, .link_last = b->link_last.data,
+		.link_chain = b->link_chain.data,
+		.link_direction = b->link_direction.data, .link_row = b->link_row.data,
+	};
+	return f;
+}
+
+void batch_free(struct ff_batch *b)
+{
+	struct vec *v[] = { &b->row_side, &b->row_kind, &b->row_samples, &b->row_scale,
+		&b->row_residual, &b->row_error, &b->row_block, &b->block_chain,
+		&b->block_start, &b->escape, &b->black, &b->lost, &b->cut, &b->block_arrival,
+		&b->column, &b->value, &b->arrival_target, &b->arrival_direction,
+		&b->link_target, &b->link_source, &b->link_last, &b->link_chain, &b->link_direction,
+		&b->link_row };
+
+	for (size_t i = 0; i < sizeof v / sizeof *v; i++)
+		free(v[i]->data);
+	*b = (struct ff_batch){ .f64 = b->f64 };
+}

@@ -1,0 +1,382 @@
+/* What elements see: the other way to a form factor. A_j F[j->e] = A_e F[e->j], so rays
+ * of an element, stratified over its own area and hemisphere, tell what each patch-side
+ * sends there, and what they tell of all patch-sides together adds up to what the
+ * element can see: its irradiance is an average with stratified samples, where landings
+ * of other patches' rays come by chance. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "ff_job.h"
+#include "mem.h"
+#include "vec3.h"
+
+/* An element's own rays tell what a patch-side sends it, if its area is small beside the
+ * patch's, and if of rays between them so many are the element's, beside those that the
+ * row casts: they are stratified over all that the element sees, so fewer do. A large
+ * element is better told by the rays of a small patch. */
+static const double larger = 2.2, enough = .11;
+
+/* How far the sum of gathered factors may be from what must land there. */
+static const double misfit = .25;
+
+/* Looking at an element from afar takes so much less time than a ray. */
+enum { LOOKS_A_RAY = 4 };
+
+struct gatherer {
+	const struct ff_job *job;
+	struct ff_gather *to;
+	uint32_t **hits;           /* [threads][2P] of the element-side at work */
+	struct vec *met;           /* [threads] uint32_t: patch-sides hit by it */
+	struct vec *pairs;         /* [patches] struct pair, by place */
+	uint32_t *sights;          /* [2E] pairs of an element-side, by place */
+	struct err *err;           /* [threads] */
+};
+
+struct pair {
+	uint32_t source, count;
+};
+
+/* The rays of an element-side; how many escape, how many meet black sides. */
+static void cast(struct gatherer *g, uint32_t column, int thread, uint32_t lost[2])
+{
+	const struct ff_job *j = g->job;
+	uint64_t seed = rng_mix(rng_mix(j->o.seed + 1) ^ rng_mix(~(uint64_t)column));
+	uint32_t seeds[FF_DIMS], *hits = g->hits[thread];
+	struct ff_batch_rays b;
+
+	for (int d = 0; d < FF_DIMS; d++)
+		seeds[d] = rng_sobol_seed(seed, d);
+	for (uint32_t first = 0; first < j->o.gather; first += RAY_BATCH) {
+		uint32_t n = j->o.gather - first < RAY_BATCH ? j->o.gather - first : RAY_BATCH;
+		ff_batch_from_element(j, &j->of_gathering, seeds, column, first, n, &b);
+		for (uint32_t i = 0; i < n; i++) {
+			if (b.ray.triangle[i] == RAY_MISS) {
+				lost[0]++;
+				continue;
+			}
+			uint32_t ps = 2 * j->m->element_patch[b.hit[i]] + b.ray.side[i];
+			lost[1] += j->is_black[ps];
+			if (j->shoots_diffuse[ps] && hits[ps]++ == 0)
+				vec_append(&g->met[thread], &ps, 1, sizeof ps, &g->err[thread]);
+		}
+	}
+}
+
+static void gather_element(struct gatherer *g, uint32_t patch, uint32_t column, int thread)
+{
+	struct vec *met = &g->met[thread];
+	uint32_t lost[2] = { 0 }, ps = 2 * patch + (column & 1);
+	double part = g->job->m->element_area[column >> 1] /
+	              (g->job->m->patch_area[patch] * g->job->o.gather);
+
+	met->n = 0;
+	cast(g, column, thread, lost);
+	g->to->escape[ps] += part * lost[0];
+	g->to->black[ps] += part * lost[1];
+	g->sights[g->job->places.place[column] & ~TALLY_APART] = (uint32_t)met->n;
+	for (size_t i = 0; i < met->n; i++) {
+		uint32_t source = ((uint32_t *)met->data)[i];
+		struct pair p = { source, g->hits[thread][source] };
+		g->hits[thread][source] = 0;
+		vec_append(&g->pairs[patch], &p, 1, sizeof p, &g->err[thread]);
+	}
+}
+
+static void gather_patches(void *arg, size_t begin, size_t end, int thread)
+{
+	struct gatherer *g = arg;
+	const struct ff_job *j = g->job;
+
+	for (uint32_t ps = 2 * (uint32_t)begin; ps < 2 * end; ps++) {
+		if (j->is_black[ps] || j->is_ideal[ps])
+			continue;
+		for (uint32_t el = j->m->patch_start[ps >> 1]; el < j->m->patch_start[(ps >> 1) + 1]; el++)
+			gather_element(g, ps >> 1, 2 * el + (ps & 1), thread);
+	}
+}
+
+static int takes(const struct ff_job *j, double patch_area, double element_area)
+{
+	return patch_area >= larger * element_area &&
+	       j->o.gather * patch_area >= enough * j->o.rays * element_area;
+}
+
+/* Pairs by receiver, in order, become lists by source, in the same order. */
+static int transpose(struct gatherer *g, struct err *e)
+{
+	struct ff_gather *to = g->to;
+	size_t patches = g->job->m->patches, sides = 2 * patches, place = 0;
+
+	for (size_t p = 0; p < patches; p++)
+		for (size_t i = 0; i < g->pairs[p].n; i++)
+			to->start[((struct pair *)g->pairs[p].data)[i].source + 1]++;
+	for (size_t ps = 0; ps < sides; ps++)
+		to->start[ps + 1] += to->start[ps];
+	to->seen = mem_new(to->start[sides], sizeof *to->seen, "gathered light", e);
+	if (!to->seen)
+		return -1;
+	for (size_t p = 0; p < patches; p++) {
+		const struct pair *pair = g->pairs[p].data, *last = pair + g->pairs[p].n;
+		for (; place < 2 * (size_t)g->job->m->patch_start[p + 1]; place++)
+			for (uint32_t k = g->sights[place]; k && pair < last; k--, pair++)
+				to->seen[to->start[pair->source]++] = (struct ff_gathered){
+					g->job->places.column[place], pair->count };
+		free(g->pairs[p].data);
+		g->pairs[p] = (struct vec){ 0 };
+	}
+	memmove(to->start + 1, to->start, sides * sizeof *to->start);
+	to->start[0] = 0;
+	return 0;
+}
+
+/* Centres, weighted by area, and radii of patches. */
+static void bound_patches(const struct ff_job *j, double (*centre)[4])
+{
+	const struct model *m = j->m;
+
+	for (size_t i = 0; i < 3 * m->elements; i++) {
+		uint32_t p = m->element_patch[i / 3];
+		v3_mad(centre[p], m->element_area[i / 3] / (3 * m->patch_area[p]),
+		       &m->vertex[3 * (size_t)m->element[i]], centre[p]);
+	}
+	for (size_t i = 0; i < 3 * m->elements; i++) {
+		double *c = centre[m->element_patch[i / 3]], d[3];
+		v3_sub(&m->vertex[3 * (size_t)m->element[i]], c, d);
+		c[3] = fmax(c[3], v3_length(d));
+	}
+}
+
+static int rows_tell_more(const struct ff_job *j)
+{
+	for (size_t ps = 0; ps < 2 * j->m->patches; ps++)
+		if (j->is_ideal[ps] || j->has_lobe[ps])
+			return 1;
+	return 0;
+}
+
+static int allocate(struct gatherer *g, size_t threads, struct err *e)
+{
+	size_t patches = g->job->m->patches, sides = 2 * patches;
+	struct ff_gather *to = g->to;
+	int good = 1;
+
+	g->hits = mem_new(threads, sizeof *g->hits, "gathering", e);
+	g->met = mem_new(threads, sizeof *g->met, "gathering", e);
+	g->err = mem_new(threads, sizeof *g->err, "gathering", e);
+	g->pairs = mem_new(patches, sizeof *g->pairs, "gathering", e);
+	g->sights = mem_new(2 * g->job->m->elements, sizeof *g->sights, "gathering", e);
+	to->start = mem_new(sides + 1, sizeof *to->start, "gathered light", e);
+	to->centre = mem_new(patches, sizeof *to->centre, "gathered light", e);
+	to->escape = mem_new(sides, sizeof *to->escape, "gathered light", e);
+	to->black = mem_new(sides, sizeof *to->black, "gathered light", e);
+	for (size_t t = 0; g->hits && t < threads; t++)
+		good &= (g->hits[t] = mem_new(sides, sizeof **g->hits, "gathering", e)) != NULL;
+	return good && g->hits && g->met && g->err && g->pairs && g->sights && to->start &&
+	       to->centre && to->escape && to->black ? 0 : -1;
+}
+
+static void release(struct gatherer *g, size_t threads)
+{
+	for (size_t t = 0; t < threads; t++) {
+		if (g->hits)
+			free(g->hits[t]);
+		if (g->met)
+			free(g->met[t].data);
+	}
+	for (size_t p = 0; g->pairs && p < g->job->m->patches; p++)
+		free(g->pairs[p].data);
+	free(g->hits);
+	free(g->met);
+	free(g->err);
+	free(g->pairs);
+	free(g->sights);
+}
+
+/* Whether the largest patch-side that shoots is large beside the smallest element. */
+static int any_takes(const struct ff_job *j)
+{
+	double most = 0, least = INFINITY;
+
+	for (size_t ps = 0; ps < 2 * j->m->patches; ps++)
+		if (j->shoots_diffuse[ps])
+			most = fmax(most, j->m->patch_area[ps >> 1]);
+	for (size_t i = 0; i < j->m->elements; i++)
+		least = fmin(least, j->m->element_area[i]);
+	return takes(j, most, least);
+}
+
+int ff_gather(struct ff_job *j, double *rays, const struct progress *progress, struct err *e)
+{
+	size_t threads = j->o.threads > 0 ? (size_t)j->o.threads : 1;
+	struct gatherer g = { .job = j, .to = &j->gather };
+	int bad;
+
+	if (!any_takes(j))
+		return 0;
+	bad = allocate(&g, threads, e);
+
+	if (!bad) {
+		par_for(j->m->patches, 1, (int)threads, gather_patches, &g, progress);
+		bound_patches(j, j->gather.centre);
+		j->gather.alone = !rows_tell_more(j);
+	}
+	for (size_t t = 0; !bad && t < threads; t++)
+		if (g.err[t].set)
+			bad = err_set(e, "%s", g.err[t].text);
+	for (uint32_t ps = 0; !bad && ps < 2 * j->m->patches; ps++)
+		if (!j->is_black[ps] && !j->is_ideal[ps])
+			*rays += (double)(j->m->patch_start[(ps >> 1) + 1] - j->m->patch_start[ps >> 1]) *
+			         j->o.gather;
+	bad = bad || transpose(&g, e);
+	release(&g, threads);
+	j->gather.rays = bad ? 0 : j->o.gather;
+	return bad ? -1 : 0;
+}
+
+void ff_gather_free(struct ff_gather *g)
+{
+	free(g->start);
+	free(g->seen);
+	free(g->centre);
+	free(g->escape);
+	free(g->black);
+	*g = (struct ff_gather){ 0 };
+}
+
+/* ---- rows of what was gathered ---- */
+
+static int element_takes(const struct ff_job *j, uint32_t ps, uint32_t column)
+{
+	return takes(j, j->m->patch_area[ps >> 1], j->m->element_area[column >> 1]);
+}
+
+int ff_row_is_seen(const struct ff_job *j, uint32_t ps)
+{
+	return j->emits[ps] &&
+	       j->m->elements <= LOOKS_A_RAY * (uint64_t)j->o.rays * j->o.emitter_gain;
+}
+
+int ff_row_is_gathered(const struct ff_job *j, uint32_t ps)
+{
+	const struct ff_gather *g = &j->gather;
+	uint64_t i = g->start[ps], end = g->start[ps + 1];
+
+	if (!g->alone || ff_row_is_seen(j, ps))
+		return g->alone;
+	if (i == end)
+		return 0;
+	while (i < end && element_takes(j, ps, g->seen[i].column))
+		i++;
+	return i == end;
+}
+
+/* F[ps -> element-side] from what was gathered, as ff_see gives it. */
+static double recall(struct ff_thread *t, uint32_t ps)
+{
+	const struct ff_job *j = t->job;
+	const struct ff_gather *g = &j->gather;
+	double sum = 0, scale = 1 / (j->m->patch_area[ps >> 1] * g->rays);
+
+	t->sights.n = 0;
+	for (uint64_t i = g->start[ps]; i < g->start[ps + 1]; i++) {
+		double n = g->seen[i].count, one = scale * j->m->element_area[g->seen[i].column >> 1];
+		struct ff_sight s = { g->seen[i].column, one * n, one * one * n * (1 - n / g->rays) };
+		if (!element_takes(j, ps, s.column))
+			continue;
+		if (vec_append(&t->sights, &s, 1, sizeof s, &t->tally.err))
+			return 0;
+		sum += s.w;
+	}
+	return sum;
+}
+
+/* The next place at or after `place` whose weight the row's own rays do not decide. */
+static uint32_t next_taken(const struct ff_thread *t, uint32_t ps, uint64_t place)
+{
+	const struct ff_job *j = t->job;
+	uint32_t at = tally_next(&t->tally, place);
+
+	while (at != UINT32_MAX && (j->is_ideal[tally_side_at(&t->tally, at)] ||
+	                            !(ff_row_is_seen(j, ps) || element_takes(j, ps, j->places.column[at]))))
+		at = tally_next(&t->tally, (uint64_t)at + 1);
+	return at;
+}
+
+/* The part of the row that its own rays bring to elements whose shares are taken from
+ * elsewhere. */
+static double brought(const struct ff_thread *t, uint32_t ps, uint32_t cast)
+{
+	double sum = 0;
+
+	for (uint32_t place = next_taken(t, ps, 0); place != UINT32_MAX;
+	     place = next_taken(t, ps, (uint64_t)place + 1))
+		sum += tally_counted(&t->tally, place);
+	return sum / cast;
+}
+
+/* The same without rays of its own: what neither escapes nor meets a black side, or the
+ * sum of what elements see, each for as much as it is certain. Books the rest. */
+static double not_lost(struct ff_thread *t, uint32_t ps, double sum, double variance)
+{
+	const struct ff_job *j = t->job;
+	const uint32_t *start = &j->m->patch_start[ps >> 1];
+	double escape = j->gather.escape[ps], black = j->gather.black[ps];
+	double own = escape * (1 - escape) / ((double)j->gather.rays * (start[1] - start[0]));
+	double lands = 1 - escape - black;
+
+	if (own > 0)
+		lands = fmin(1 - black, (lands * variance + sum * own) / (variance + own));
+	tally_rest(&t->tally, 0)->escape = fmax(0, 1 - black - lands);
+	tally_rest(&t->tally, 0)->black = black;
+	return lands;
+}
+
+/* Where no ray of the row's own tells from where light comes to a lobe. */
+static void guess_arrival(struct ff_thread *t, uint32_t ps, uint32_t target)
+{
+	double *toward = t->tally.toward[target];
+
+	if (t->job->has_lobe[target] && !(v3_dot(toward, toward) > 0))
+		v3_sub(t->job->gather.centre[ps >> 1], t->job->gather.centre[target >> 1], toward);
+}
+
+/* The sights, scaled, in place of what the row's own rays say of the same elements. */
+static void put_sights(struct ff_thread *t, uint32_t ps, double scale)
+{
+	const struct ff_job *j = t->job;
+	const struct ff_sight *s = t->sights.data;
+
+	for (uint32_t place = next_taken(t, ps, 0); place != UINT32_MAX;
+	     place = next_taken(t, ps, (uint64_t)place + 1))
+		tally_set(&t->tally, place, 0, 0);
+	for (size_t i = 0; i < t->sights.n; i++) {
+		tally_set(&t->tally, j->places.place[s[i].column] & ~TALLY_APART, scale * s[i].w,
+		          scale * scale * s[i].variance);
+		guess_arrival(t, ps, 2 * j->m->element_patch[s[i].column >> 1] + (s[i].column & 1));
+	}
+}
+
+int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_weight *w)
+{
+	const struct ff_job *j = t->job;
+	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
+	int seen = ff_row_is_seen(j, ps);
+	double sum = seen ? ff_see(t, ps, rays, &t->tally.err) : recall(t, ps);
+	double variance = 0, total = cast ? cast : 1;
+
+	for (size_t i = 0; i < t->sights.n; i++)
+		variance += ((const struct ff_sight *)t->sights.data)[i].variance;
+	double lands = cast ? brought(t, ps, cast) : not_lost(t, ps, sum, variance);
+	if (t->tally.err.set || !(lands > 0 && sum > 0) ||
+	    fabs(sum - lands) > misfit * lands + 3 * sqrt(lands / rays)) {
+		if (!cast)
+			*tally_rest(&t->tally, 0) = (struct tally_rest){ 0 };
+		return 0;
+	}
+	put_sights(t, ps, total * lands / sum);
+	if (cast)
+		variance += (1 - lands) / cast;
+	*w = (struct ff_weight){ (uint32_t)fmax(1, fmin(UINT32_MAX, 1 / variance)), total };
+	return 1;
+}
