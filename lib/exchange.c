@@ -5,7 +5,7 @@
 #include "rng.h"
 #include "vec3.h"
 
-enum { CROWD_RAYS = 1024, CROWD_PARTS = 4 };
+enum { CROWD_PARTS = 4 };
 
 void exchanger_init(struct exchanger *x, const struct exchange_options *o,
                     const struct body_set *bodies, struct ray_scene *rays,
@@ -43,10 +43,11 @@ static double crowded(struct exchanger *x, const struct facet *a, const struct f
                       double clear, uint64_t seed, double *error)
 {
 	double part[CROWD_PARTS], mean = 0, square = 0;
+	uint32_t rays = (uint32_t)x->o.crowd_rays;
 
 	for (uint32_t p = 0; p < CROWD_PARTS; p++) {
 		double seen = 0, all = 0;
-		for (uint32_t i = 0; i < CROWD_RAYS / CROWD_PARTS; i++) {
+		for (uint32_t i = 0; i < rays / CROWD_PARTS; i++) {
 			double u[4], y[3], z[3], d[3];
 			for (int k = 0; k < 4; k++)
 				u[k] = rng_sobol(i, k, seed + p);
@@ -67,7 +68,7 @@ static double crowded(struct exchanger *x, const struct facet *a, const struct f
 	}
 	for (uint32_t p = 0; p < CROWD_PARTS; p++)
 		square += (part[p] - mean) * (part[p] - mean);
-	*error = clear * (sqrt(square / (CROWD_PARTS * (CROWD_PARTS - 1))) + 1. / CROWD_RAYS);
+	*error = clear * (sqrt(square / (CROWD_PARTS * (CROWD_PARTS - 1))) + 1. / rays);
 	return clear * mean;
 }
 
@@ -119,6 +120,10 @@ double exchange(struct exchanger *x, const struct facet_set *sa, uint32_t i,
 		x->counts.partly++;
 		x->counts.evaluations += x->occluded.seer.evaluations - before;
 		return sum;
+	}
+	if (sight == SIGHT_CROWDED && !x->o.crowd_rays) {
+		x->counts.crowded++;
+		return 0;
 	}
 	double clear = clear_exchange(&x->clear, a, pa, b, pb);
 	*error = x->o.relative * clear;

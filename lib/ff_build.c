@@ -9,7 +9,10 @@
 #include "ff_matrix.h"
 #include "vec3.h"
 
-enum { PATCHES_AT_A_TIME = 64, SOBOL_POINTS_MAX = 1 << 16 };
+enum { FORMULA_EVALUATIONS = 1000, PATCHES_AT_A_TIME = 64, SOBOL_POINTS_MAX = 1 << 16 };
+
+/* Of what nothing hides, by formula to elements: finer than any picture shows. */
+static const double FORMULA_ERROR = 1e-5;
 
 /* ---- what leaves which side ---- */
 
@@ -162,6 +165,7 @@ static void job_free(struct ff_job *j)
 	locator_free(&j->locator);
 	tally_places_free(&j->places);
 	ff_gather_free(&j->gather);
+	ff_formula_free(&j->formula);
 	ray_scene_free(j->rays);
 	hemi_scene_free(j->cubes);
 	hemi_grid_free(&j->grid);
@@ -169,9 +173,17 @@ static void job_free(struct ff_job *j)
 
 static int thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e)
 {
+	const struct exchange_options o = { FORMULA_ERROR, j->o.target, FORMULA_EVALUATIONS, 0 };
+
 	*t = (struct ff_thread){ .job = j };
 	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, e))
 		return -1;
+	if (j->formula.on) {
+		t->formula = mem_new(1, sizeof *t->formula, "formulas", e);
+		if (!t->formula)
+			return -1;
+		exchanger_init(t->formula, &o, &j->formula.bodies, j->rays, j->formula.centre);
+	}
 	if (j->o.method != FF_HEMICUBE)
 		return 0;
 	t->item = mem_new(2 * (size_t)j->o.points, j->grid.pixels * sizeof *t->item,
@@ -184,6 +196,9 @@ static void thread_free(struct ff_thread *t)
 {
 	tally_free(&t->tally);
 	hemicube_free(&t->cube);
+	if (t->formula)
+		exchanger_free(t->formula);
+	free(t->formula);
 	free(t->captures.data);
 	free(t->sights.data);
 	free(t->item);
@@ -236,6 +251,15 @@ void ff_count(struct ff_stats *s, const struct ff *f)
 	s->entries += f->entries;
 }
 
+void ff_count_pairs(struct ff_stats *s, const struct exchange_counts *c)
+{
+	s->pairs[0] += c->clear;
+	s->pairs[1] += c->hidden;
+	s->pairs[2] += c->partly;
+	s->pairs[3] += c->crowded;
+	s->evaluations += c->evaluations;
+}
+
 /* Hands the finished batches on, in patch order, with the file's chain numbers. */
 static int emit(struct run *r, size_t n, struct chains *whole, struct ff_stats *stats,
                 const struct ff_sink *sink, struct err *e)
@@ -280,7 +304,7 @@ static int gather(struct ff_job *j, struct ff_stats *stats, const struct progres
 	struct part_progress pp = { progress, 0, 2. * (double)j->m->patches };
 	struct progress inner = { report, &pp };
 
-	if (!j->o.gather || j->o.method != FF_RAYS)
+	if (!j->o.gather || j->o.method == FF_HEMICUBE)
 		return 0;
 	return ff_gather(j, &stats->rays, &inner, e);
 }
@@ -337,6 +361,8 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 	int threads = o->threads > 0 ? o->threads : 1;
 	struct run run = { .job = &job };
 	int bad = job_init(&job, m, o, e) || chains_init(&chains, m, e);
+	int formula = o->method == FF_ANALYTIC || o->method == FF_AUTO;
+	int matrix = !bad && formula && o->to_patches && ff_matrix_can(&job);
 
 	*stats = (struct ff_stats){ 0 };
 	*whole = (struct ff){ .part = o->part, .parts = o->parts };
@@ -347,12 +373,14 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 	run.owner = mem_new(PATCHES_AT_A_TIME, sizeof *run.owner, "batches", e);
 	run.err = mem_new(PATCHES_AT_A_TIME, sizeof *run.err, "batches", e);
 	bad = bad || !run.thread || !run.batch || !run.owner || !run.err;
+	if (formula && !matrix)
+		bad = bad || ff_formula_init(&job.formula, m, o->method == FF_ANALYTIC, e);
 	for (int t = 0; !bad && t < threads; t++)
 		bad = thread_init(&run.thread[t], &job, e);
 	for (size_t i = 0; !bad && i < PATCHES_AT_A_TIME; i++)
 		run.batch[i].f64 = o->f64;
-	if (!bad && o->method == FF_ANALYTIC)
-		bad = ff_matrix(&job, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
+	if (matrix)
+		bad = bad || ff_matrix(&job, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
 		      put_chains(whole, &chains, e);
 	else
 		bad = bad || gather(&job, stats, progress, e) ||
@@ -360,6 +388,8 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 	                         sink, progress, e) || put_chains(whole, &chains, e);
 	for (int t = 0; run.thread && t < threads; t++) {
 		stats->rays += run.thread[t].rays;
+		if (run.thread[t].formula)
+			ff_count_pairs(stats, &run.thread[t].formula->counts);
 		thread_free(&run.thread[t]);
 	}
 	if (stats->rows[FF_DIFFUSE])

@@ -7,7 +7,7 @@
 #include "model.h"
 #include "par.h"
 
-enum ff_method { FF_RAYS, FF_HEMICUBE, FF_ANALYTIC };
+enum ff_method { FF_RAYS, FF_HEMICUBE, FF_ANALYTIC, FF_AUTO };
 
 struct ff_options {
 	enum ff_method method;

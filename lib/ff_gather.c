@@ -253,6 +253,8 @@ static int element_takes(const struct ff_job *j, uint32_t ps, uint32_t column)
 
 int ff_row_is_seen(const struct ff_job *j, uint32_t ps)
 {
+	if (ff_formula_has(&j->formula, ps) && (j->formula.all || j->emits[ps]))
+		return 1;
 	return j->emits[ps] &&
 	       j->m->elements <= LOOKS_A_RAY * (uint64_t)j->o.rays * j->o.emitter_gain;
 }

@@ -3,6 +3,7 @@
 #define TWOPASS_FF_JOB_H
 
 #include "ff_build.h"
+#include "ff_formula.h"
 #include "ff_tally.h"
 #include "hemicube.h"
 #include "locate.h"
@@ -63,6 +64,7 @@ struct ff_job {
 	struct ff_samples of_rows, of_gathering;
 	struct tally_places places;
 	struct ff_gather gather;
+	struct ff_formula formula;
 };
 
 /* A way that light can come to a directional patch-side: sampled backwards. */
@@ -102,6 +104,7 @@ struct ff_thread {
 	struct view *view;        /* hemicube: [points][2 sides] */
 	double rays;
 	struct vec sights;        /* struct ff_sight */
+	struct exchanger *formula; /* NULL: nothing is computed by formula */
 	struct ff_batch_rays lobe; /* lobe rays waiting to be cast */
 	uint32_t lobes;
 	struct vec chain_map;     /* local -> whole */
@@ -129,6 +132,7 @@ void ff_batch_directions(const struct ff_job *j, int side, uint32_t n,
 
 /* Adds a batch's rows to the statistics. */
 void ff_count(struct ff_stats *s, const struct ff *f);
+void ff_count_pairs(struct ff_stats *s, const struct exchange_counts *c);
 
 /* Casts n rays and finds the elements where they land. */
 void ff_batch_cast(const struct ff_job *j, uint32_t n, struct ff_batch_rays *b);

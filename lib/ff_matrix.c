@@ -9,7 +9,8 @@
 #include "lobe.h"
 #include "vec3.h"
 
-enum { BAND_BYTES = 192 << 20, ROWS_AT_A_TIME = 64, TILE = 32, REST_RAYS = 256 };
+enum { BAND_BYTES = 192 << 20, ROWS_AT_A_TIME = 64, TILE = 32, REST_RAYS = 256,
+       CROWD_RAYS = 1024 };
 
 /* A factor whose error is not just the relative one of all. */
 struct doubt {
@@ -262,12 +263,25 @@ static int find_sides(struct matrix *m, struct err *e)
 	return 0;
 }
 
+/* Plane patches only, and nothing that sends light on but by Lambert's law. */
+int ff_matrix_can(const struct ff_job *j)
+{
+	const struct model *m = j->m;
+
+	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
+		if (model_side_modelled(m, ps) &&
+		    (m->patch_loop[(ps >> 1) + 1] == m->patch_loop[ps >> 1] || j->is_ideal[ps] ||
+		     j->has_lobe[ps] || j->shoots_lobe[ps]))
+			return 0;
+	return 1;
+}
+
 int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct ff_sink *sink,
               struct ff_stats *stats, const struct progress *progress, struct err *e)
 {
 	struct matrix m = { .job = j };
 	struct exchange_options o = { .relative = j->o.f64 ? 1e-9 : 4e-7, .absolute = j->o.target,
-	                              .most = j->o.evaluations };
+	                              .most = j->o.evaluations, .crowd_rays = CROWD_RAYS };
 	size_t a = 0, b;
 	int bad = find_sides(&m, e) || facet_set_init(&m.facets, j->m, FACETS_OF_PATCHES, e) ||
 	          body_set_init(&m.bodies, j->m, e);
@@ -283,12 +297,7 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
 		b++;
 	bad = bad || bands(&m, a, b, sink, stats, progress, e);
 	for (int t = 0; m.thread && t < j->o.threads; t++) {
-		const struct exchange_counts *c = &m.thread[t].x.counts;
-		stats->pairs[0] += c->clear;
-		stats->pairs[1] += c->hidden;
-		stats->pairs[2] += c->partly;
-		stats->pairs[3] += c->crowded;
-		stats->evaluations += c->evaluations;
+		ff_count_pairs(stats, &m.thread[t].x.counts);
 		exchanger_free(&m.thread[t].x);
 		free(m.thread[t].doubt.data);
 	}

@@ -5,6 +5,9 @@
 
 #include "ff_job.h"
 
+/* 1 if a model is all plane patches without lobes, mirrors and panes. */
+int ff_matrix_can(const struct ff_job *j);
+
 /* All diffuse rows of patches [begin, end) to the sink, in batches with patch-sides as
  * columns. O(patch-sides^2) time for what nothing hides, a bounded part of the matrix in
  * memory at a time: pairs with a patch outside it are computed once more with the other.

@@ -185,9 +185,14 @@ static struct ff_sight sight(struct ff_thread *t, uint32_t source, uint32_t colu
 {
 	struct outlook o = look(t->job, source, column, rays);
 	struct ff_sight s = { column, 0, 0 };
-	double odds = fmin(1, o.want / faint);
+	double odds = fmin(1, o.want / faint), e, off;
 	uint32_t n = 1;
 
+	if (ff_formula_has(&t->job->formula, source) &&
+	    ff_formula_exchange(t->formula, &t->job->formula, source, column, &e, &off, &t->tally.err)) {
+		double area = t->job->m->patch_area[source >> 1];
+		return (struct ff_sight){ column, e / area, off / area * (off / area) };
+	}
 	if (o.close)
 		return see_close(t, source, column);
 	if (odds < 1 && !(rng_uniform(chance) < odds))

@@ -18,10 +18,10 @@ enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GA
 
 static const struct cli_option options[] = {
 	{ 'o', "output", "FILE", "write the form factors to FILE (.ff)" },
-	{ 'm', "method", "METHOD", "rays, hemicube or analytic (default rays)" },
+	{ 'm', "method", "METHOD", "auto, rays, hemicube or analytic (default auto)" },
 	{ 'n', "samples", "N", "rays a patch-side (default 4096), or pixels along a hemicube's edge (64)" },
 	{ 'p', "points", "N", "hemicubes a patch-side (default 16)" },
-	{ 't', "target", "X", "analytic: absolute error of a factor that is partly hidden (default 1e-6)" },
+	{ 't', "target", "X", "formulas: absolute error of a factor that is partly hidden (default 1e-4, to patches 1e-6)" },
 	{ OPT_TO, "to", "WHAT", "elements or patches: what receives (default elements)" },
 	{ OPT_GAIN, "emitter-gain", "N", "times as many rays for emitters (default 8)" },
 	{ OPT_GATHER, "gather", "N", "rays an element-side gathers with (default a sixteenth of -n)" },
@@ -57,15 +57,15 @@ static void parse_word(const struct cli *c, const char *option, const char *text
 	*value = strcmp(text, yes) == 0;
 }
 
-static const char *const method_name[] = { "rays", "hemicube", "analytic" };
+static const char *const method_name[] = { "rays", "hemicube", "analytic", "auto" };
 
 static enum ff_method parse_method(const struct cli *c, const char *text)
 {
-	for (int i = 0; i < 3; i++)
+	for (int i = 0; i < 4; i++)
 		if (strcmp(text, method_name[i]) == 0)
 			return (enum ff_method)i;
-	cli_usage(c, "--method %s: must be rays, hemicube or analytic", text);
-	return FF_RAYS;
+	cli_usage(c, "--method %s: must be auto, rays, hemicube or analytic", text);
+	return FF_AUTO;
 }
 
 static void parse(struct cli *c, int argc, char **argv, struct request *r)
@@ -75,7 +75,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 	struct ff_options *o = &r->ff;
 
 	*o = (struct ff_options){ .points = 16, .emitter_gain = 8, .lobe_rays = 4096, .depth = 256,
-	                          .seed = 1, .target = 1e-6, .evaluations = 20000, .part = 1, .parts = 1 };
+	                          .seed = 1, .method = FF_AUTO, .evaluations = 20000, .part = 1, .parts = 1 };
 	while ((letter = cli_next(c, argc, argv)) != -1) {
 		switch (letter) {
 		case 'o': r->output = optarg; break;
@@ -106,6 +106,8 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		o->rays = (o->rays + 3) / 4 * 4;
 	if (!hemicube)
 		o->gather = gather >= 0 ? (uint32_t)gather : o->rays >= 256 ? o->rays / 16 : 0;
+	if (o->target == 0)
+		o->target = o->to_patches ? 1e-6 : 1e-4;
 	o->threads = c->threads;
 }
 
@@ -118,12 +120,12 @@ static json_t *options_json(const struct ff_options *o)
 		"precision", o->f64 ? "f64" : "f32",
 		"part", (json_int_t)o->part, "parts", (json_int_t)o->parts);
 
-	if (o->method == FF_RAYS)
+	if (o->method != FF_HEMICUBE)
 		json_object_set_new(j, "gather", json_integer(o->gather));
 	json_object_set_new(j, "emitter_gain", json_integer(o->emitter_gain));
 	if (o->to_patches)
 		json_object_set_new(j, "to", json_string("patches"));
-	if (o->method == FF_ANALYTIC)
+	if (o->method == FF_ANALYTIC || o->method == FF_AUTO)
 		json_object_set_new(j, "target", json_real(o->target));
 	if (o->method == FF_HEMICUBE)
 		json_object_set_new(j, "points", json_integer(o->points));
@@ -171,7 +173,7 @@ static void print_report(const struct ff_stats *s, const struct request *r, doub
 	fprintf(out, "rays          %.0f (%.2f Mray/s)\n", s->rays, s->rays / seconds * 1e-6);
 	if (r->ff.method == FF_HEMICUBE)
 		fprintf(out, "pixels        %.0f (%.2f Mpixel/s)\n", s->samples, s->samples / seconds * 1e-6);
-	if (r->ff.method == FF_ANALYTIC)
+	if (s->pairs[0] > 0)
 		fprintf(out, "pairs         %.0f clear, %.0f hidden, %.0f partly (%.1f evaluations each), "
 		        "%.0f sampled\n", s->pairs[0], s->pairs[1], s->pairs[2],
 		        s->evaluations / fmax(1, s->pairs[2]), s->pairs[3]);
