@@ -1,303 +1,15 @@
 /* Cutting triangles along segments: end points are put in, then edges are made to lead
- * along the segments by flipping or halving the edges in the way (Sloan 1993, but cut
- * where a line is in the way); in between, Lawson's flips (1977) towards Delaunay's
+ * along the segments by flipping the edges in the way (Sloan 1993), or halving them where
+ * they are lines themselves; in between, Lawson's flips (1977) towards Delaunay's
  * triangulation keep the pieces in shape. Points closer than `apart` are one, so no
- * piece is thinner than about that. */
+ * piece is much thinner than that. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "imprint.h"
-#include "vec3.h"
+#include "pieces.h"
 
-enum { STEPS_MAX = 100000, PASSES_MAX = 64, PIECES_MAX = 1 << 28 };
-
-struct cutter {
-	const struct model *m;
-	const struct edges *g;
-	struct pieces *p;
-	double apart;
-	uint32_t triangle;    /* being cut, and its frame */
-	const double *origin;
-	double axis[2][3];
-	struct err *e;
-};
-
-struct point {
-	double x, y;
-};
-
-static struct piece *piece_of(const struct cutter *c, uint32_t h)
-{
-	return (struct piece *)c->p->piece.data + h / 3;
-}
-
-static const double *place(const struct cutter *c, uint32_t vertex)
-{
-	return (const double *)c->p->vertex.data + 3 * (size_t)vertex;
-}
-
-static uint32_t from(const struct cutter *c, uint32_t h)
-{
-	return piece_of(c, h)->v[h % 3];
-}
-
-static uint32_t following(uint32_t h)
-{
-	return h % 3 == 2 ? h - 2 : h + 1;
-}
-
-static uint32_t preceding(uint32_t h)
-{
-	return h % 3 == 0 ? h + 2 : h - 1;
-}
-
-/* ---- the plane of the triangle that is being cut ---- */
-
-static void set_triangle(struct cutter *c, uint32_t triangle)
-{
-	const uint32_t *v = &c->m->triangle[3 * (size_t)triangle];
-	double n[3], d[3];
-
-	c->triangle = triangle;
-	c->origin = &c->m->vertex[3 * (size_t)v[0]];
-	v3_sub(&c->m->vertex[3 * (size_t)v[1]], c->origin, c->axis[0]);
-	v3_sub(&c->m->vertex[3 * (size_t)v[2]], c->origin, d);
-	v3_cross(c->axis[0], d, n);
-	v3_normalise(c->axis[0]);
-	v3_normalise(n);
-	v3_cross(n, c->axis[0], c->axis[1]);
-}
-
-static struct point flat(const struct cutter *c, const double x[3])
-{
-	double d[3];
-
-	v3_sub(x, c->origin, d);
-	return (struct point){ v3_dot(d, c->axis[0]), v3_dot(d, c->axis[1]) };
-}
-
-static struct point flat_vertex(const struct cutter *c, uint32_t vertex)
-{
-	return flat(c, place(c, vertex));
-}
-
-static double distance(struct point a, struct point b)
-{
-	return hypot(b.x - a.x, b.y - a.y);
-}
-
-/* Twice the area of a b x: positive if x is on the left of a b. */
-static double turn(struct point a, struct point b, struct point x)
-{
-	return (b.x - a.x) * (x.y - a.y) - (b.y - a.y) * (x.x - a.x);
-}
-
-/* How far x is on the left of the line from a to b. */
-static double left_of(struct point a, struct point b, struct point x)
-{
-	return turn(a, b, x) / distance(a, b);
-}
-
-/* ---- changes of the pieces ---- */
-
-struct half {
-	uint32_t across, rim;
-	uint8_t line;
-};
-
-static struct half get_half(const struct cutter *c, uint32_t h)
-{
-	const struct piece *p = piece_of(c, h);
-
-	return (struct half){ p->across[h % 3], p->rim[h % 3], p->line[h % 3] };
-}
-
-/* Half-edge h becomes what `s` says, and the one across it knows. */
-static void set_half(struct cutter *c, uint32_t h, struct half s)
-{
-	struct piece *p = piece_of(c, h);
-
-	p->across[h % 3] = s.across;
-	p->rim[h % 3] = s.rim;
-	p->line[h % 3] = s.line;
-	if (s.across != RIM)
-		piece_of(c, s.across)->across[s.across % 3] = h;
-}
-
-/* Half-edges h and g become the two sides of a new edge. */
-static void join_halves(struct cutter *c, uint32_t h, uint32_t g)
-{
-	set_half(c, h, (struct half){ g, RIM, 0 });
-	set_half(c, g, (struct half){ h, RIM, 0 });
-}
-
-/* A copy of piece i as a further part of the same triangle: *j = its number. */
-static int copy_piece(struct cutter *c, uint32_t i, uint32_t *j)
-{
-	struct piece new = ((struct piece *)c->p->piece.data)[i];
-
-	*j = (uint32_t)c->p->piece.n;
-	if (*j >= PIECES_MAX)
-		return err_set(c->e, "more than %d triangles after cutting them where others touch "
-		               "them; use --no-imprint", PIECES_MAX);
-	if (vec_append(&c->p->piece, &new, 1, sizeof new, c->e))
-		return -1;
-	((struct piece *)c->p->piece.data)[i].next = *j;
-	return 0;
-}
-
-static int add_vertex(struct cutter *c, const double x[3], uint32_t *vertex)
-{
-	double at[3] = { x[0], x[1], x[2] }; /* x may lie in the array that grows */
-
-	*vertex = (uint32_t)c->p->vertex.n;
-	return vec_append(&c->p->vertex, at, 1, sizeof at, c->e);
-}
-
-/* Halves the piece of h at a vertex on h: h keeps the first half, *second becomes the
- * other. What is across them is left to the caller. */
-static int halve_piece(struct cutter *c, uint32_t h, uint32_t vertex, uint32_t *second)
-{
-	uint32_t i = h / 3, j, k = h % 3;
-
-	if (copy_piece(c, i, &j))
-		return -1;
-	*second = 3 * j + k;
-	piece_of(c, *second)->v[k] = vertex;
-	piece_of(c, h)->v[(k + 1) % 3] = vertex;
-	set_half(c, following(*second), get_half(c, following(h)));
-	join_halves(c, following(h), preceding(*second));
-	return 0;
-}
-
-/* The half-edge between two vertices, either way, of a part of an input triangle. */
-static uint32_t find_half(const struct cutter *c, uint32_t triangle, uint32_t a, uint32_t b)
-{
-	for (uint32_t i = triangle; i != RIM; i = piece_of(c, 3 * i)->next)
-		for (uint32_t h = 3 * i; h < 3 * i + 3; h++) {
-			uint32_t p = from(c, h), q = from(c, following(h));
-			if ((p == a && q == b) || (p == b && q == a))
-				return h;
-		}
-	return RIM;
-}
-
-/* Does what `change` says to every half-edge in the place of h, which lies on an edge of
- * the input mesh. */
-static int along_rim(struct cutter *c, uint32_t h, uint32_t vertex,
-                     int (*change)(struct cutter *, uint32_t, uint32_t))
-{
-	uint32_t a = from(c, h), b = from(c, following(h)), edge = get_half(c, h).rim;
-
-	for (uint32_t u = c->g->start[edge]; u < c->g->start[edge + 1]; u++) {
-		uint32_t other = find_half(c, c->g->use[u] / 3, a, b);
-		if (other != RIM && change(c, other, vertex))
-			return -1;
-	}
-	return 0;
-}
-
-static int halve_on_rim(struct cutter *c, uint32_t h, uint32_t vertex)
-{
-	uint32_t second;
-
-	return halve_piece(c, h, vertex, &second);
-}
-
-/* Puts a vertex on half-edge h, in every piece that has that edge. */
-static int halve_edge(struct cutter *c, uint32_t h, uint32_t vertex)
-{
-	uint32_t across = get_half(c, h).across, second, other;
-
-	if (across == RIM)
-		return along_rim(c, h, vertex, halve_on_rim);
-	if (halve_piece(c, h, vertex, &second) || halve_piece(c, across, vertex, &other))
-		return -1;
-	piece_of(c, h)->across[h % 3] = other;
-	piece_of(c, other)->across[other % 3] = h;
-	piece_of(c, second)->across[second % 3] = across;
-	piece_of(c, across)->across[across % 3] = second;
-	return 0;
-}
-
-/* Divides piece i at a vertex inside. */
-static int halve_face(struct cutter *c, uint32_t i, uint32_t vertex)
-{
-	uint32_t j, l;
-
-	if (copy_piece(c, i, &j) || copy_piece(c, i, &l))
-		return -1;
-	piece_of(c, 3 * i)->v[2] = vertex;
-	piece_of(c, 3 * j)->v[0] = vertex;
-	piece_of(c, 3 * l)->v[1] = vertex;
-	set_half(c, 3 * j + 1, get_half(c, 3 * i + 1));
-	set_half(c, 3 * l + 2, get_half(c, 3 * i + 2));
-	join_halves(c, 3 * i + 1, 3 * j);
-	join_halves(c, 3 * i + 2, 3 * l);
-	join_halves(c, 3 * j + 2, 3 * l + 1);
-	return 0;
-}
-
-/* The pieces a b c and b a d on either side of h, which leads from a to b, exchange
- * their common edge for the other diagonal of a d b c: h then leads from c to d. */
-static void flip(struct cutter *c, uint32_t h)
-{
-	uint32_t g = get_half(c, h).across;
-	uint32_t h1 = following(h), h2 = preceding(h), g1 = following(g), g2 = preceding(g);
-	uint32_t corner[4] = { from(c, h), from(c, g), from(c, h2), from(c, g2) };
-	struct half b_c = get_half(c, h1), c_a = get_half(c, h2);
-	struct half a_d = get_half(c, g1), d_b = get_half(c, g2);
-
-	piece_of(c, h)->v[h % 3] = piece_of(c, g)->v[g1 % 3] = corner[2];
-	piece_of(c, g)->v[g % 3] = piece_of(c, h)->v[h1 % 3] = corner[3];
-	piece_of(c, h)->v[h2 % 3] = corner[1];
-	piece_of(c, g)->v[g2 % 3] = corner[0];
-	set_half(c, h1, d_b);
-	set_half(c, h2, b_c);
-	set_half(c, g1, c_a);
-	set_half(c, g2, a_d);
-}
-
-/* Are the pieces on either side of h a convex quadrilateral, and one that stays two
- * pieces of some height when it is cut along its other diagonal? */
-static int may_flip(const struct cutter *c, uint32_t h)
-{
-	struct half s = get_half(c, h);
-
-	if (s.across == RIM || s.line)
-		return 0;
-	struct point a = flat_vertex(c, from(c, h)), b = flat_vertex(c, from(c, s.across));
-	struct point p = flat_vertex(c, from(c, preceding(h)));
-	struct point q = flat_vertex(c, from(c, preceding(s.across)));
-	return left_of(p, q, b) > .5 * c->apart && left_of(q, p, a) > .5 * c->apart;
-}
-
-/* Cotangent of the angle opposite to h. */
-static double cotangent(const struct cutter *c, uint32_t h)
-{
-	struct point x = flat_vertex(c, from(c, preceding(h)));
-	struct point a = flat_vertex(c, from(c, h)), b = flat_vertex(c, from(c, following(h)));
-
-	return ((a.x - x.x) * (b.x - x.x) + (a.y - x.y) * (b.y - x.y)) / turn(x, a, b);
-}
-
-/* Flips edges whose opposite angles exceed 180 degrees, by more than rounding. */
-static void flip_edges(struct cutter *c)
-{
-	int changed = 1;
-
-	for (int pass = 0; changed && pass < PASSES_MAX; pass++) {
-		changed = 0;
-		for (uint32_t i = c->triangle; i != RIM; i = piece_of(c, 3 * i)->next)
-			for (uint32_t h = 3 * i; h < 3 * i + 3; h++)
-				if (may_flip(c, h) &&
-				    cotangent(c, h) + cotangent(c, get_half(c, h).across) < -1e-6) {
-					flip(c, h);
-					changed = 1;
-				}
-	}
-}
+enum { STEPS_MAX = 100000 };
 
 /* ---- points ---- */
 
@@ -324,9 +36,10 @@ static uint32_t find_piece(const struct cutter *c, struct point x)
 	double deepest = -INFINITY;
 
 	for (int step = 0; step < STEPS_MAX; step++) {
-		if (depth(c, i, x, &side) >= 0)
-			return i;
+		double d = depth(c, i, x, &side);
 		uint32_t across = get_half(c, side).across;
+		if (d >= 0 || (across == RIM && d >= -c->apart))
+			return i;
 		if (across == RIM)
 			break;
 		i = across / 3;
@@ -406,7 +119,10 @@ static void look(const struct cutter *c, uint32_t h, uint32_t u, uint32_t v, str
 		left[k] = left_of(begin, end, x);
 		double along = ((x.x - begin.x) * (end.x - begin.x) +
 		                (x.y - begin.y) * (end.y - begin.y)) / length;
-		int on = vertex == v || (fabs(left[k]) <= c->apart && along > 0 && along < length);
+		/* Nearer to the end by more than rounding, lest two vertices on either side
+		 * of the line lead to each other. */
+		int on = vertex == v || (fabs(left[k]) <= c->apart && along > 0 &&
+		                         distance(x, end) < length - 1e-3 * c->apart);
 		if (on && (w->edge == RIM || along < w->along)) {
 			w->edge = edge[k];
 			w->vertex = vertex;
@@ -465,24 +181,76 @@ static int cross_edge(struct cutter *c, uint32_t h, uint32_t u, uint32_t v)
 	return add_vertex(c, x, &vertex) || halve_edge(c, h, vertex) ? -1 : 0;
 }
 
+/* Collects in c->crossed the half-edges that the line from u to v crosses, from the
+ * first one on, up to a vertex on the line. *blocked = the one among them that must not
+ * be flipped away, a line or a side of the triangle, or RIM. */
+static int walk_line(struct cutter *c, uint32_t h, uint32_t u, uint32_t v, uint32_t *blocked)
+{
+	struct point begin = flat_vertex(c, u), end = flat_vertex(c, v);
+
+	c->crossed.n = 0;
+	*blocked = RIM;
+	for (int step = 0; step < STEPS_MAX; step++) {
+		struct half s = get_half(c, h);
+		if (s.line || s.across == RIM) {
+			*blocked = h;
+			return 0;
+		}
+		if (vec_append(&c->crossed, &h, 1, sizeof h, c->e))
+			return -1;
+		uint32_t apex = from(c, preceding(s.across));
+		double left = left_of(begin, end, flat_vertex(c, apex));
+		if (apex == v || fabs(left) <= c->apart)
+			return 0;
+		h = left > 0 ? following(s.across) : preceding(s.across);
+	}
+	return 0;
+}
+
+/* The crossed half-edge to flip next: one at the vertex that is furthest from the line.
+ * That takes all of them out of the way in the end (Osherovich and Bruckstein 2008). */
+static uint32_t choose_flip(const struct cutter *c, uint32_t u, uint32_t v)
+{
+	struct point begin = flat_vertex(c, u), end = flat_vertex(c, v);
+	const uint32_t *h = c->crossed.data;
+	uint32_t best = RIM;
+	double furthest = 0;
+
+	for (size_t i = 0; i < c->crossed.n; i++) {
+		double a = fabs(left_of(begin, end, flat_vertex(c, from(c, h[i]))));
+		double b = fabs(left_of(begin, end, flat_vertex(c, from(c, following(h[i])))));
+		if (fmax(a, b) > furthest && may_flip(c, h[i])) {
+			furthest = fmax(a, b);
+			best = h[i];
+		}
+	}
+	return best;
+}
+
 /* Makes edges lead from vertex u to vertex v and marks them. */
 static int draw_line(struct cutter *c, uint32_t u, uint32_t v)
 {
 	for (int step = 0; u != v && step < STEPS_MAX; step++) {
-		uint32_t h = find_corner(c, u);
+		uint32_t h = find_corner(c, u), blocked;
 		if (h == RIM)
 			return 0;
 		struct way w = look_around(c, h, u, v);
 		if (w.edge != RIM) {
 			mark_line(c, w.edge);
 			u = w.vertex;
-		} else if (w.crossed == RIM || get_half(c, w.crossed).across == RIM) {
-			return 0; /* rounding leads out of the triangle, along its rim */
-		} else if (may_flip(c, w.crossed)) {
-			flip(c, w.crossed);
-		} else if (cross_edge(c, w.crossed, u, v)) {
-			return -1;
+			continue;
 		}
+		if (w.crossed == RIM)
+			return 0;
+		if (walk_line(c, w.crossed, u, v, &blocked))
+			return -1;
+		if (blocked != RIM && get_half(c, blocked).across == RIM)
+			return 0; /* rounding leads out of the triangle, along its side */
+		h = blocked == RIM ? choose_flip(c, u, v) : RIM;
+		if (h != RIM)
+			flip_edge(c, h);
+		else if (cross_edge(c, blocked != RIM ? blocked : w.crossed, u, v))
+			return -1;
 	}
 	return 0;
 }
@@ -525,6 +293,47 @@ static int begin(struct cutter *c)
 	return status;
 }
 
+/* How many half-edges lie in the place of h. */
+static uint32_t halves_at(const struct cutter *c, uint32_t h)
+{
+	uint32_t edge = get_half(c, h).rim;
+
+	return get_half(c, h).across != RIM ? 2 : c->g->start[edge + 1] - c->g->start[edge];
+}
+
+static int halve_line(struct cutter *c, uint32_t h)
+{
+	double middle[3], edge[3];
+	uint32_t vertex;
+
+	v3_sub(place(c, from(c, following(h))), place(c, from(c, h)), edge);
+	v3_mad(place(c, from(c, h)), .5, edge, middle);
+	return add_vertex(c, middle, &vertex) || halve_edge(c, h, vertex) ? -1 : 0;
+}
+
+/* Halves lines of a single edge, whose ends are no place to part the surface at. */
+static int halve_short_lines(struct cutter *c)
+{
+	size_t halves = 3 * c->p->piece.n, vertices = c->p->vertex.n;
+	uint32_t *at = mem_new(vertices, sizeof *at, "lines", c->e);
+	int status = at ? 0 : -1;
+
+	for (uint32_t h = 0; at && h < halves; h++)
+		if (get_half(c, h).line) {
+			at[from(c, h)]++;
+			at[from(c, following(h))]++;
+		}
+	for (uint32_t h = 0; !status && h < halves; h++) {
+		uint32_t n = halves_at(c, h), a = from(c, h), b = from(c, following(h));
+		if (get_half(c, h).line && b < vertices && at[a] == n && at[b] == n) {
+			at[a] = at[b] = 0; /* so that the halves across h are passed over */
+			status = halve_line(c, h);
+		}
+	}
+	free(at);
+	return status;
+}
+
 /* Is the triangle so thin that its own corners are near its sides? */
 static int too_thin(const struct model *m, uint32_t triangle, double height)
 {
@@ -553,6 +362,9 @@ int cut_triangles(const struct model *m, const struct edges *g, const struct con
 		status = cut_triangle(&c, &list[i], next - i, &ends);
 		p->cut++;
 	}
+	if (!status)
+		status = halve_short_lines(&c);
 	free(ends.data);
+	free(c.crossed.data);
 	return status ? -1 : 0;
 }

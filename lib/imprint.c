@@ -20,7 +20,7 @@ static struct imprint_limits limits_of(const struct model *m, double size)
 	double thick = fmax(1e-6 * diagonal, 0x1p-48 * largest);
 	return (struct imprint_limits){ .size = size * (1 + 1e-8), .thick = thick,
 		                        .apart = fmax(1e-3 * size, 2 * thick),
-		                        .shortest = size / 8 };
+		                        .shortest = size / 2 };
 }
 
 int imprint(struct model *m, double size, struct mesher_report *r, struct err *e)

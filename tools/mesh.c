@@ -273,7 +273,7 @@ static void print_counts(FILE *f, const struct job *j)
 		fprintf(f, "\nimprint     %zu triangle%s cut along %zu line%s where others touch",
 		        r->cut, plural(r->cut), r->lines, plural(r->lines));
 	if (r->fine_contacts)
-		fprintf(f, "%s%zu contact%s of less than 1/8 element left alone",
+		fprintf(f, "%s%zu contact%s of less than half an element left alone",
 		        r->cut ? "; " : "\nimprint     ", r->fine_contacts, plural(r->fine_contacts));
 	fprintf(f, "\nelements    %zu", m->elements);
 	print_size(f, "edges", r->element_size);
