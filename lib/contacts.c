@@ -98,11 +98,15 @@ static int clip(const struct search *s, uint32_t a, double end[2][3], int *rim)
 	v3_sub(end[1], end[0], d);
 	if (!((to - from) * v3_length(d) > s->limits->apart))
 		return 0;
+	double nearest = s->limits->apart;
 	*rim = -1;
 	for (int k = 0; k < 3; k++) {
 		double slope = height[k][1] - height[k][0];
-		if (fmax(height[k][0] + from * slope, height[k][0] + to * slope) <= s->limits->apart)
+		double reach = fmax(height[k][0] + from * slope, height[k][0] + to * slope);
+		if (reach <= nearest) {
+			nearest = reach;
 			*rim = k;
+		}
 	}
 	v3_mad(end[0], to, d, end[1]);
 	v3_mad(end[0], from, d, end[0]);

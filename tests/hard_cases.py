@@ -401,7 +401,7 @@ def isolated_unlit(lab):
         need((f.h[f.faces("dark *", "front")] == 0).all(), f"exactly dark, {method}")
 
 
-@waiting("elements that straddle a wall are not split: light arrives on their lit part")
+@case
 def light_leak_under_wall(lab):
     for method in ("rays", "hemicube"):
         f = lab.oracle("box_in_box_isolated", .25, method)
