@@ -234,7 +234,7 @@ static char *make_key(const struct job *j)
 	char hex[33];
 	struct digest *d = digest_new();
 
-	digest_string(d, "mesh " TWOPASS_VERSION " " CACHE_VERSION);
+	digest_string(d, "mesh " TWOPASS_VERSION " " CACHE_VERSION " " REVISION_MESH);
 	digest_string(d, j->info.options);
 	digest_string(d, j->gltf.digest);
 	digest_end(d, hex);
