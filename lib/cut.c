@@ -301,16 +301,6 @@ static uint32_t halves_at(const struct cutter *c, uint32_t h)
 	return get_half(c, h).across != RIM ? 2 : c->g->start[edge + 1] - c->g->start[edge];
 }
 
-static int halve_line(struct cutter *c, uint32_t h)
-{
-	double middle[3], edge[3];
-	uint32_t vertex;
-
-	v3_sub(place(c, from(c, following(h))), place(c, from(c, h)), edge);
-	v3_mad(place(c, from(c, h)), .5, edge, middle);
-	return add_vertex(c, middle, &vertex) || halve_edge(c, h, vertex) ? -1 : 0;
-}
-
 /* Halves lines of a single edge, whose ends are no place to part the surface at. */
 static int halve_short_lines(struct cutter *c)
 {
@@ -327,7 +317,7 @@ static int halve_short_lines(struct cutter *c)
 		uint32_t n = halves_at(c, h), a = from(c, h), b = from(c, following(h));
 		if (get_half(c, h).line && b < vertices && at[a] == n && at[b] == n) {
 			at[a] = at[b] = 0; /* so that the halves across h are passed over */
-			status = halve_line(c, h);
+			status = halve_middle(c, h);
 		}
 	}
 	free(at);
@@ -364,6 +354,9 @@ int cut_triangles(const struct model *m, const struct edges *g, const struct con
 	}
 	if (!status)
 		status = halve_short_lines(&c);
+	for (size_t i = 0; !status && i < n; i++)
+		if (i == 0 || list[i].triangle != list[i - 1].triangle)
+			status = refine_triangle(&c, list[i].triangle, limits->size);
 	free(ends.data);
 	free(c.crossed.data);
 	return status ? -1 : 0;

@@ -127,6 +127,16 @@ int halve_edge(struct cutter *c, uint32_t h, uint32_t vertex)
 	return 0;
 }
 
+int halve_middle(struct cutter *c, uint32_t h)
+{
+	double middle[3], edge[3];
+	uint32_t vertex;
+
+	v3_sub(place(c, from(c, following(h))), place(c, from(c, h)), edge);
+	v3_mad(place(c, from(c, h)), .5, edge, middle);
+	return add_vertex(c, middle, &vertex) || halve_edge(c, h, vertex) ? -1 : 0;
+}
+
 int halve_face(struct cutter *c, uint32_t i, uint32_t vertex)
 {
 	uint32_t j, l;

@@ -107,6 +107,9 @@ int along_rim(struct cutter *c, uint32_t h, uint32_t vertex,
 /* Puts a vertex on half-edge h, in every piece that has that edge. h keeps its begin. */
 int halve_edge(struct cutter *c, uint32_t h, uint32_t vertex);
 
+/* Halves an edge in the middle. */
+int halve_middle(struct cutter *c, uint32_t h);
+
 /* Divides piece i into three at a vertex inside. */
 int halve_face(struct cutter *c, uint32_t i, uint32_t vertex);
 
@@ -121,5 +124,9 @@ void flip_edge(struct cutter *c, uint32_t h);
 /* Flips edges of the triangle whose opposite angles exceed 180 degrees, by more than
  * rounding. */
 void flip_edges(struct cutter *c);
+
+/* refine.c: divides pieces of a triangle that are longer than `size` until they have no
+ * angle below 20 degrees. The triangle's pieces must be as flip_edges leaves them. */
+int refine_triangle(struct cutter *c, uint32_t triangle, double size);
 
 #endif

@@ -156,11 +156,11 @@ static void test_footprint(void **state)
 			double unit = v3_length(frame[1]);
 			struct mesher_report r = mesh(&m, .1 * unit);
 			assert_int_equal(r.cut, 2);
-			assert_true(r.lines >= 4 && r.lines <= 8);
+			assert_true(r.lines >= 4 && r.lines <= 20);
 			double area = area_within(&m, 0, frame, within_block);
 			if (!one_surface)
 				assert_true(fabs(area - .09 * unit * unit) < 1e-11 * unit * unit);
-			assert_true(worst_shape(&m) > .02);
+			assert_true(worst_shape(&m) > .1);
 			mesher_report_free(&r);
 			model_free(&m);
 		}
@@ -213,8 +213,9 @@ static void test_crossing(void **state)
 		double unit = v3_length(frame[1]);
 		struct mesher_report r = mesh(&m, .2 * unit);
 		assert_int_equal(r.cut, 4);
-		/* One line through either quad, halved where it crosses the diagonal. */
-		assert_int_equal(r.lines, 4);
+		/* One line through either quad, halved where it crosses the diagonal, and
+		 * once more to keep the pieces in shape. */
+		assert_true(r.lines >= 4 && r.lines <= 6);
 		assert_true(fabs(area_within(&m, 0, frame, left_half) - .37 * unit * unit) <
 		            1e-11 * unit * unit);
 		mesher_report_free(&r);
@@ -285,7 +286,7 @@ static void test_flush(void **state)
 	transform(&m, 1, 1, 0);
 	struct mesher_report r = run(&m, sizes(.2, .1, 0));
 	assert_int_equal(r.cut, 1);
-	assert_int_equal(r.lines, 4);
+	assert_true(r.lines >= 4 && r.lines <= 8);
 	mesher_report_free(&r);
 	model_free(&m);
 }
