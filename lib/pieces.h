@@ -125,8 +125,8 @@ void flip_edge(struct cutter *c, uint32_t h);
  * rounding. */
 void flip_edges(struct cutter *c);
 
-/* refine.c: divides pieces of a triangle that are longer than `size` until they have no
- * angle below 20 degrees. The triangle's pieces must be as flip_edges leaves them. */
+/* refine.c: divides pieces of a triangle that are longer than `size`, and than 1/32 of the
+ * triangle, until they have no angle below 20 degrees, where lines leave room for that. The triangle's pieces must be as flip_edges leaves them. */
 int refine_triangle(struct cutter *c, uint32_t triangle, double size);
 
 #endif

@@ -1,7 +1,8 @@
 /* Delaunay refinement (Ruppert 1995) of triangles that were cut: pieces that are both
  * longer than an element and too slender get a vertex at the centre of their
  * circumcircle, or, where a line or a side is in the way, that is halved. Nothing shorter
- * than an element is divided, so no more pieces are made than elements would be. */
+ * than an element, or than a small part of the triangle, is divided, which bounds the
+ * number of pieces. */
 #include <math.h>
 
 #include "pieces.h"
@@ -10,7 +11,12 @@
  * refinement is sure to end. */
 #define LEAST_SINE .342
 
-enum { ROUNDS_MAX = 64, STEPS_MAX = 10000 };
+enum {
+	ROUNDS_MAX = 64,
+	STEPS_MAX = 10000,
+	FINEST = 32 /* of a triangle's longest edge: where lines meet at small angles the
+	               refinement goes on to the least size all around */
+};
 
 static double length(const struct cutter *c, uint32_t h)
 {
@@ -118,6 +124,7 @@ int refine_triangle(struct cutter *c, uint32_t triangle, double size)
 {
 	int changed = 1;
 
+	size = fmax(size, longest_edge(c->m, triangle) / FINEST);
 	set_triangle(c, triangle);
 	for (int round = 0; changed && round < ROUNDS_MAX; round++) {
 		changed = 0;
