@@ -70,14 +70,11 @@ static uint32_t coplanar(const struct search *s, uint32_t h)
 	return h / 3;
 }
 
-/* The part of a segment, given in the plane of triangle a, that lies in a. 0 if there
- * is none to speak of. *rim = the side of a along which it runs, or -1. */
-static int clip(const struct search *s, uint32_t a, double end[2][3], int *rim)
+/* height[k][i] = how far end i lies within side k of triangle a, 0 if nearly on it. */
+static void heights(const struct search *s, uint32_t a, double end[2][3], double height[3][2])
 {
-	double from = 0, to = 1, height[3][2], d[3];
-
 	for (int k = 0; k < 3; k++) {
-		double edge[3], inward[3];
+		double edge[3], inward[3], d[3];
 		v3_sub(corner(s->m, a, (k + 1) % 3), corner(s->m, a, k), edge);
 		v3_cross(s->normal[a], edge, inward);
 		v3_normalise(inward);
@@ -87,6 +84,34 @@ static int clip(const struct search *s, uint32_t a, double end[2][3], int *rim)
 			if (fabs(height[k][i]) <= s->limits->thick)
 				height[k][i] = 0;
 		}
+	}
+}
+
+/* The side along which all of [from, to] of a segment with these heights runs, or -1. */
+static int side_along(const struct search *s, double height[3][2], double from, double to)
+{
+	double nearest = s->limits->apart;
+	int side = -1;
+
+	for (int k = 0; k < 3; k++) {
+		double slope = height[k][1] - height[k][0];
+		double reach = fmax(height[k][0] + from * slope, height[k][0] + to * slope);
+		if (reach <= nearest) {
+			nearest = reach;
+			side = k;
+		}
+	}
+	return side;
+}
+
+/* The part of a segment, given in the plane of triangle a, that lies in a. 0 if there
+ * is none to speak of. *rim = the side of a along which it runs, or -1. */
+static int clip(const struct search *s, uint32_t a, double end[2][3], int *rim)
+{
+	double from = 0, to = 1, height[3][2], d[3];
+
+	heights(s, a, end, height);
+	for (int k = 0; k < 3; k++) {
 		double low = height[k][0], high = height[k][1];
 		if (low < 0 && high < 0)
 			return 0;
@@ -98,16 +123,7 @@ static int clip(const struct search *s, uint32_t a, double end[2][3], int *rim)
 	v3_sub(end[1], end[0], d);
 	if (!((to - from) * v3_length(d) > s->limits->apart))
 		return 0;
-	double nearest = s->limits->apart;
-	*rim = -1;
-	for (int k = 0; k < 3; k++) {
-		double slope = height[k][1] - height[k][0];
-		double reach = fmax(height[k][0] + from * slope, height[k][0] + to * slope);
-		if (reach <= nearest) {
-			nearest = reach;
-			*rim = k;
-		}
-	}
+	*rim = side_along(s, height, from, to);
 	v3_mad(end[0], to, d, end[1]);
 	v3_mad(end[0], from, d, end[0]);
 	return 1;
