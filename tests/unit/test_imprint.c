@@ -5,6 +5,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include "../../lib/boxes.h"
 #include "../../lib/imprint.h"
 #include "shapes.h"
 
@@ -375,6 +376,47 @@ static void test_many(void **state)
 	model_free(&m);
 }
 
+/* The tree finds the boxes that a look at each of them finds, once each. */
+static void test_boxes(void **state)
+{
+	enum { MANY = 500 };
+	struct rng random = rng_seed(3, 1);
+
+	(void)state;
+	for (uint32_t n = 1; n <= MANY; n = 2 * n + 1) {
+		double vertex[3 * MANY][3];
+		uint32_t triangle[3 * MANY];
+		struct boxes b;
+		struct vec found = { 0 };
+		struct err e = { 0 };
+		for (uint32_t i = 0; i < 3 * n; i++) {
+			random_vector(&random, 1, vertex[i]);
+			if (i % 3)
+				for (int k = 0; k < 3; k++)
+					vertex[i][k] = vertex[i - i % 3][k] + .1 * vertex[i][k];
+			triangle[i] = i;
+		}
+		assert_int_equal(boxes_build(&b, vertex[0], triangle, n, &e), 0);
+		for (uint32_t i = 0; i < n; i++) {
+			size_t near = 0;
+			found.n = 0;
+			assert_int_equal(boxes_find(&b, &b.box[i], .01, &found, &e), 0);
+			for (uint32_t j = 0; j < n; j++) {
+				int apart = 0;
+				for (int k = 0; k < 3; k++)
+					apart |= b.box[j].lo[k] > b.box[i].hi[k] + .01 ||
+					         b.box[j].hi[k] < b.box[i].lo[k] - .01;
+				for (size_t f = 0; f < found.n && !apart; f++)
+					near += ((uint32_t *)found.data)[f] == j;
+				near += apart ? 0 : 0x10000;
+			}
+			assert_int_equal(near, found.n * 0x10001);
+		}
+		free(found.data);
+		boxes_free(&b);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -387,6 +429,7 @@ int main(void)
 		cmocka_unit_test(test_options),
 		cmocka_unit_test(test_random),
 		cmocka_unit_test(test_many),
+		cmocka_unit_test(test_boxes),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
