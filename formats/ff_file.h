@@ -27,6 +27,10 @@ int ff_file_finish(struct ff_writer *w, const struct ff *whole, const struct cac
                    struct err *e);
 void ff_file_abandon(struct ff_writer *w);
 
+/* Gives the file, made for the geometry of m, the names of m's surfaces and materials.
+ * 0 if it has them already, 1 if it was rewritten with them, -1 and e. O(file) then. */
+int ff_file_rename(const char *path, const struct model *m, struct err *e);
+
 /* An open .ff; f's and scene's arrays point into the mapped file (do not ff_free
  * f, do not write to them). */
 struct ff_file {

@@ -145,10 +145,12 @@ static void tell(const struct mesher_options *o, int stage)
 int mesher_run(struct model *m, const struct mesher_options *o, struct mesher_report *r,
                struct err *e)
 {
-	if (clean(m, r, e) || set_sizes(m, o, r, e))
+	if (clean(m, r, e) || set_sizes(m, o, r, e) ||
+	    check_element_size(m, r->element_size, e))
 		return -1;
 	tell(o, 1);
-	if (subdivide(m, r->element_size, e))
+	if ((!o->no_imprint && imprint(m, r->element_size, r, e)) ||
+	    subdivide(m, r->element_size, e))
 		return -1;
 	tell(o, 2);
 	if (make_patches(m, o, r, e) || model_derive(m, e))

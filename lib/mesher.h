@@ -23,6 +23,7 @@ struct mesher_options {
 	int element_within_patch;    /* 1: no longer than the patch size either */
 	double normal_cone;          /* degrees: how far the elements of a grouped
 	                                patch may turn away from its mean normal */
+	int no_imprint;              /* 1: triangles are not cut where others touch them */
 	const struct progress *progress; /* or NULL */
 };
 
@@ -40,6 +41,10 @@ struct mesher_report {
 	struct mesher_surface total;
 	uint32_t merged;                 /* kept triangles whose black back became the
 	                                    side of the duplicate that faced that way */
+
+	size_t cut;                      /* triangles cut where others touch them, */
+	size_t lines;                    /* along how many new edges */
+	size_t fine_contacts;            /* contacts too short to be worth a cut */
 
 	double diagonal;                 /* of the scene's bounding box, m */
 	double patch_size, element_size; /* m, or INFINITY */

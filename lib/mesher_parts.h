@@ -63,6 +63,14 @@ int merge_sandwiches(struct model *m, const uint64_t *twin, const uint8_t *keep,
 int check_closed(const struct model *m, const uint32_t *position, size_t places,
                  struct mesher_report *r, struct err *e);
 
+/* subdivide.c: refuses a hopeless size before any work: no mesh of edges up to `size` has
+ * fewer elements than its area over that of an equilateral triangle. */
+int check_element_size(const struct model *m, double size, struct err *e);
+
+/* imprint.c: cuts triangles longer than `size` along the lines where others cross them
+ * or stand on them, and parts the surface there: see imprint.h. */
+int imprint(struct model *m, double size, struct mesher_report *r, struct err *e);
+
 /* subdivide.c: fills elements (in no useful order) and split trees so that no
  * edge is longer than `size`. Always the longest edge of a surface is halved,
  * together with all triangles that share it. */

@@ -66,7 +66,7 @@ struct model {
 	size_t vertices;
 	double *vertex;           /* [vertices][3] world, metres */
 
-	size_t triangles;         /* input triangles, cleaned */
+	size_t triangles;         /* input triangles, cleaned and cut where others touch */
 	uint32_t *triangle;       /* [triangles][3] vertices, counter-clockwise
 	                             seen from the front */
 	uint32_t *triangle_surface;

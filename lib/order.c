@@ -1,11 +1,11 @@
-/* Numbering along a Morton curve (Morton 1966): every cube of the octree over the
+/* Numbering along a Morton curve: every cube of the octree over the
  * scene's box is a contiguous range of patches, and of elements. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "mem.h"
 #include "mesher_parts.h"
+#include "morton.h"
 #include "vec3.h"
 
 struct place {
@@ -14,44 +14,12 @@ struct place {
 	uint32_t old;       /* old number of the patch or element */
 };
 
-struct curve {
-	double centre[3], scale;
-};
-
-/* 21 bits of x moved to every third place. */
-static uint64_t spread_bits(uint64_t x)
-{
-	x = (x | x << 32) & 0x1f00000000ffffu;
-	x = (x | x << 16) & 0x1f0000ff0000ffu;
-	x = (x | x << 8) & 0x100f00f00f00f00fu;
-	x = (x | x << 4) & 0x10c30c30c30c30c3u;
-	return (x | x << 2) & 0x1249249249249249u;
-}
-
-/* Code of a point given relative to the box's centre. */
-static uint64_t morton(const struct curve *c, const double x[3])
-{
-	uint64_t code = 0;
-
-	for (int k = 0; k < 3; k++) {
-		double cell = floor((x[k] * c->scale + .5) * 0x1p21);
-		code |= spread_bits((uint64_t)fmin(fmax(cell, 0), 0x1p21 - 1)) << k;
-	}
-	return code;
-}
-
 static struct curve scene_curve(const struct model *m)
 {
-	struct curve c;
-	double lo[3], hi[3], side = 0;
+	double lo[3], hi[3];
 
 	scene_box(m, lo, hi);
-	for (int k = 0; k < 3; k++) {
-		c.centre[k] = .5 * (lo[k] + hi[k]);
-		side = fmax(side, hi[k] - lo[k]);
-	}
-	c.scale = 1 / side;
-	return c;
+	return curve_of(lo, hi);
 }
 
 static int compare_places(const void *pa, const void *pb)

@@ -179,6 +179,10 @@ static int trace_loop(struct tracer *t, uint32_t h)
 			return -1;
 	}
 	straighten(t, l.begin);
+	if (t->corner.n - l.begin < 3) {
+		t->corner.n = l.begin; /* there and back along a slit: it bounds no area */
+		return 0;
+	}
 	l.end = (uint32_t)t->corner.n;
 	l.area = loop_area(t, (uint32_t *)t->corner.data + l.begin, l.end - l.begin);
 	return vec_append(&t->loop, &l, 1, sizeof l, t->e);

@@ -246,9 +246,7 @@ static int finish(struct work *w)
 	return 0;
 }
 
-/* No mesh of edges up to `size` has fewer elements than its area over that of
- * an equilateral triangle: a hopeless size is refused before any work. */
-static int check_size(const struct model *m, double size, struct err *e)
+int check_element_size(const struct model *m, double size, struct err *e)
 {
 	double area = 0, a[3];
 
@@ -271,7 +269,7 @@ int subdivide(struct model *m, double size, struct err *e)
 	int status;
 
 	w.limit = size * size * (1 + 1e-8);
-	status = check_size(m, size, e) || begin(&w);
+	status = begin(&w);
 	while (!status && w.heap.n)
 		status = halve_side(&w, heap_pop(&w));
 	if (!status)

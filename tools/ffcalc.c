@@ -150,7 +150,7 @@ static void make_key(const struct cache_info *mesh, const char *chosen, char key
 {
 	struct digest *d = digest_new();
 
-	digest_string(d, "ffcalc " TWOPASS_VERSION);
+	digest_string(d, "ffcalc " TWOPASS_VERSION " " REVISION_FF);
 	digest_string(d, mesh->geometry_id);
 	digest_string(d, chosen);
 	digest_end(d, key);
@@ -228,7 +228,11 @@ static int run(struct cli *c, const struct request *r, int argc, char **argv, st
 		json_decref(j);
 		make_key(&mesh, info.options, key);
 		if (cache_up_to_date(r->output, "twopass.ff", key)) {
-			cli_note(c, "%s: up to date", r->output);
+			int renamed = ff_file_rename(r->output, &m, e);
+			bad = renamed < 0 ? -1 : 0;
+			if (!bad)
+				cli_note(c, "%s: %s", r->output, renamed ? "names replaced, form factors kept"
+				                                         : "up to date");
 		} else {
 			info.key = strdup(key);
 			info.history = history_append(mesh.history, argc, argv, e);

@@ -15,13 +15,15 @@
 
 #define FORMAT "twopass.mesh"
 
-enum { OPT_CONE = 256, OPT_DIRECTIONAL, OPT_EXPONENT, OPT_LOBE, OPT_BANDS, OPT_CLAMP };
+enum { OPT_CONE = 256, OPT_DIRECTIONAL, OPT_EXPONENT, OPT_LOBE, OPT_BANDS, OPT_CLAMP,
+       OPT_NO_IMPRINT };
 
 static const struct cli_option options[] = {
 	{ 'o', "output", "FILE", "write the mesh to FILE (.mesh; - is standard output)" },
 	{ 'p', "patch-size", "SIZE", "longest side of a patch: metres, 5% of the scene, inf (default 5%)" },
 	{ 'e', "element-size", "SIZE", "longest edge of an element (default 4%, but within the patch size)" },
 	{ OPT_CONE, "normal-cone", "DEG", "how far normals in a curved patch may turn (default 20)" },
+	{ OPT_NO_IMPRINT, "no-imprint", NULL, "do not cut surfaces where others cross or touch them" },
 	{ OPT_DIRECTIONAL, "min-directional", "X", "fold derived lobes below this share into diffuse (default .05)" },
 	{ OPT_EXPONENT, "min-exponent", "K", "fold derived lobes of lower exponent into diffuse (default 2)" },
 	{ OPT_LOBE, "lobe", "KIND", "what exponents mean: paper (default) or reciprocal" },
@@ -90,6 +92,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		case OPT_CONE:
 			r->mesher.normal_cone = cli_number(c, "--normal-cone", optarg, 0, 80);
 			break;
+		case OPT_NO_IMPRINT: r->mesher.no_imprint = 1; break;
 		case OPT_DIRECTIONAL:
 			r->gltf.min_directional = cli_number(c, "--min-directional", optarg, 0, 1);
 			break;
@@ -136,11 +139,12 @@ static json_t *size_json(struct mesher_size s)
 
 static char *options_text(const struct request *r, struct err *e)
 {
-	return dump(json_pack("{s:o, s:o, s:b, s:f, s:f, s:o, s:s, s:i, s:b}",
+	return dump(json_pack("{s:o, s:o, s:b, s:f, s:b, s:f, s:o, s:s, s:i, s:b}",
 	                      "patch_size", size_json(r->mesher.patch),
 	                      "element_size", size_json(r->mesher.element),
 	                      "element_within_patch", r->mesher.element_within_patch,
 	                      "normal_cone", r->mesher.normal_cone,
+	                      "imprint", !r->mesher.no_imprint,
 	                      "min_directional", r->gltf.min_directional,
 	                      "min_exponent", length_json(r->gltf.min_exponent),
 	                      "lobe", r->gltf.lobe == LOBE_PAPER ? "paper" : "reciprocal",
@@ -186,6 +190,12 @@ static json_t *materials_json(const struct mesher_report *r)
 	                 "transmitting", (json_int_t)r->transmitting);
 }
 
+static json_t *imprint_json(const struct mesher_report *r)
+{
+	return json_pack("{s:I, s:I, s:I}", "cut", (json_int_t)r->cut, "lines",
+	                 (json_int_t)r->lines, "fine_contacts", (json_int_t)r->fine_contacts);
+}
+
 static json_t *pieces_json(const struct mesher_report *r)
 {
 	return json_pack("{s:I, s:I, s:I, s:I}", "connected", (json_int_t)r->components,
@@ -199,7 +209,7 @@ static char *report_text(const struct job *j, struct err *e)
 	const struct mesher_report *r = &j->mesher;
 
 	return dump(json_pack("{s:i, s:o, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:o, s:o, s:f, s:f,"
-	                      " s:o, s:I, s:o, s:o, s:o}",
+	                      " s:o, s:I, s:o, s:o, s:o, s:o}",
 	                      "bands", j->m.bands, "materials", materials_json(r),
 	                      "surfaces", (json_int_t)j->m.surface.n,
 	                      "triangles", (json_int_t)j->m.triangles,
@@ -214,6 +224,7 @@ static char *report_text(const struct job *j, struct err *e)
 	                      "cleaned", cleaned_json(&r->total),
 	                      "merged", (json_int_t)r->merged,
 	                      "cleaned_surfaces", surfaces_json(j),
+	                      "imprint", imprint_json(r),
 	                      "pieces", pieces_json(r), "notes", notes_json(&j->gltf)), e);
 }
 
@@ -223,7 +234,7 @@ static char *make_key(const struct job *j)
 	char hex[33];
 	struct digest *d = digest_new();
 
-	digest_string(d, "mesh " TWOPASS_VERSION " " CACHE_VERSION);
+	digest_string(d, "mesh " TWOPASS_VERSION " " CACHE_VERSION " " REVISION_MESH);
 	digest_string(d, j->info.options);
 	digest_string(d, j->gltf.digest);
 	digest_end(d, hex);
@@ -258,6 +269,12 @@ static void print_counts(FILE *f, const struct job *j)
 		fprintf(f, ", %u coincident dropped", r->total.duplicate);
 	if (r->total.welded)
 		fprintf(f, ", %u vertices welded", r->total.welded);
+	if (r->cut)
+		fprintf(f, "\nimprint     %zu triangle%s cut along %zu line%s where others touch",
+		        r->cut, plural(r->cut), r->lines, plural(r->lines));
+	if (r->fine_contacts)
+		fprintf(f, "%s%zu contact%s of less than half an element left alone",
+		        r->cut ? "; " : "\nimprint     ", r->fine_contacts, plural(r->fine_contacts));
 	fprintf(f, "\nelements    %zu", m->elements);
 	print_size(f, "edges", r->element_size);
 	fprintf(f, "patches     %zu, %zu of them plane", m->patches, r->planar_patches);

@@ -115,7 +115,7 @@ static void picture_key(struct reference *r, const char *content)
 	char camera[33];
 
 	cache_camera_id(r->view, camera);
-	digest_string(d, "twopass.reference " TWOPASS_VERSION);
+	digest_string(d, "twopass.reference " TWOPASS_VERSION " " REVISION_VIEW);
 	digest_string(d, content);
 	digest_string(d, camera);
 	digest_bytes(d, number, sizeof number);

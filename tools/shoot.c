@@ -79,6 +79,22 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 
 /* ---- inputs ---- */
 
+/* Shards in the order of their patches, however they were given. */
+static void sort_shards(struct job *j)
+{
+	for (size_t i = 1; i < j->r->shards; i++)
+		for (size_t k = i; k > 0 && j->file[k].f.patch_begin < j->file[k - 1].f.patch_begin; k--) {
+			struct ff_file file = j->file[k];
+			const char *name = j->name[k];
+			j->file[k] = j->file[k - 1];
+			j->name[k] = j->name[k - 1];
+			j->file[k - 1] = file;
+			j->name[k - 1] = name;
+		}
+	for (size_t i = 0; i < j->r->shards; i++)
+		j->ff[i] = &j->file[i].f;
+}
+
 static int open_inputs(struct job *j, struct err *e)
 {
 	const struct request *r = j->r;
@@ -91,9 +107,9 @@ static int open_inputs(struct job *j, struct err *e)
 	for (size_t i = 0; i < r->shards; i++) {
 		if (ff_file_open(r->ff[i], &j->m, &j->mesh, &j->file[i], e))
 			return -1;
-		j->ff[i] = &j->file[i].f;
 		j->name[i] = r->ff[i];
 	}
+	sort_shards(j);
 	return 0;
 }
 
@@ -103,7 +119,7 @@ static void make_key(const struct job *j, char key[33])
 	struct digest *d = digest_new();
 	const struct model *m = &j->m;
 
-	digest_string(d, "shoot " TWOPASS_VERSION);
+	digest_string(d, "shoot " TWOPASS_VERSION " " REVISION_RAD);
 	digest_string(d, j->mesh.geometry_id);
 	digest_string(d, j->mesh.material_id);
 	for (size_t i = 0; i < m->surface.n; i++)

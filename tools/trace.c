@@ -222,7 +222,7 @@ static void picture_key(const struct trace *t, struct shot *s)
 	struct digest *d = digest_new();
 
 	cache_camera_id(s->camera, camera);
-	digest_string(d, "twopass.exr " TWOPASS_VERSION);
+	digest_string(d, "twopass.exr " TWOPASS_VERSION " " REVISION_VIEW);
 	digest_string(d, t->content);
 	digest_string(d, camera);
 	digest_bytes(d, number, sizeof number);

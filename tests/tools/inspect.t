@@ -74,4 +74,17 @@ refuses 1 "this is a twopass.mesh file; --patch-matrix needs" "--patch-matrix of
 refuses 2 "ask for one" "two outputs at once" inspect --csv --patch-matrix "$T/a.ff"
 refuses 1 "/dev/full" "full device" inspect --npy vertex "$T/a.mesh" -o /dev/full
 
+# Without bounds a plane face of two triangles is one patch with an outline, named after
+# its node.
+prepare mesh "$scenes/furnace-two-sided.gltf" -o "$T/b.mesh" -p inf -e inf
+prepare ffcalc "$T/b.mesh" -o "$T/b.ff" -n 64
+check "a patch a face: names" sh -c "inspect --patch-matrix '$T/b.ff' | head -n 1 |
+	tr , '\\n' | sort | tr '\\n' ' ' |
+	grep -q '^ceiling:f escape floor:f from sheet:b sheet:f xmax:f xmin:f ymax:f ymin:f $'"
+check "a patch a face: outlines of four corners" $PYTHON -c '
+import sys, chain, numpy as np
+_, a = chain.container(sys.argv[1])
+assert len(a["patch_surface"]) == 7 and len(a["triangle"]) == 14
+assert (np.diff(a["patch_loop"]) == 1).all() and (np.diff(a["loop_start"]) == 4).all()' "$T/b.mesh"
+
 done_testing

@@ -85,6 +85,29 @@ check "shoot: a camera moved, the same solution" same "$T/a.rad" "$T/first.rad" 
 says yes "trace: the camera that stayed" trace "$T/a.rad" -c classic -o "$T/classic.exr" $V
 says no "trace: the camera that moved" trace "$T/a.rad" -c corner -o "$T/corner.exr" $V
 
+# Another name for a wall.
+prepare solve "$T/a.gltf"
+edit "$scenes/cornell.gltf" "$T/named.gltf" '
+for n in g["nodes"]:
+    if n["name"] == "floor":
+        n["name"] = "ground"'
+prepare mesh "$T/named.gltf" -o "$T/a.mesh" $M
+says no "ffcalc: a wall renamed" ffcalc "$T/a.mesh" -o "$T/a.ff" $F
+check "ffcalc: a wall renamed, nothing computed" grep -q 'names replaced, form factors kept' "$T/says.err"
+check "ffcalc: a wall renamed, the same form factors" same "$T/a.ff" "$T/first.ff" column value row_scale
+check "ffcalc: a whole file with the new name" sh -c \
+	"inspect --verify '$T/a.ff' && inspect --patch-matrix '$T/a.ff' | head -n 1 | grep -q ground"
+says yes "ffcalc: the same name again" ffcalc "$T/a.mesh" -o "$T/a.ff" $F
+
+# Shards in another order.
+prepare sh -c "ffcalc --part 1/2 '$T/a.mesh' -o '$T/1.ff' $F && ffcalc --part 2/2 '$T/a.mesh' -o '$T/2.ff' $F"
+prepare shoot "$T/a.mesh" "$T/1.ff" "$T/2.ff" -o "$T/a.rad"
+cp "$T/a.rad" "$T/first.rad"
+says yes "shoot: shards in another order" shoot "$T/a.mesh" "$T/2.ff" "$T/1.ff" -o "$T/a.rad"
+rm "$T/a.rad"
+prepare shoot "$T/a.mesh" "$T/2.ff" "$T/1.ff" -o "$T/a.rad"
+check "shoot: and the same solution" same "$T/a.rad" "$T/first.rad" $field
+
 # A lamp that is switched on where there was none shoots from other patches.
 edit "$scenes/cornell.gltf" "$T/glow.gltf" \
 	'g["materials"][1]["extras"]["twopass"]["emission_front"] = [1, 1, 1]'

@@ -40,9 +40,16 @@ static inline void begin(struct model *m, size_t surfaces, int one_sided)
 	}
 }
 
+/* Room for one more than n rows, which grows by doubling: the sanitizer's realloc always
+ * copies. */
+static inline void *one_more(void *rows, size_t n, size_t size)
+{
+	return n & (n - 1) ? rows : realloc(rows, (n ? 2 * n : 1) * size);
+}
+
 static inline void add_vertex(struct model *m, double x, double y, double z)
 {
-	m->vertex = realloc(m->vertex, 3 * (m->vertices + 1) * sizeof *m->vertex);
+	m->vertex = one_more(m->vertex, m->vertices, 3 * sizeof *m->vertex);
 	double *v = &m->vertex[3 * m->vertices++];
 	v[0] = x, v[1] = y, v[2] = z;
 }
@@ -52,10 +59,10 @@ static inline void add_triangle(struct model *m, uint32_t a, uint32_t b, uint32_
 {
 	size_t n = m->triangles++;
 
-	m->triangle = realloc(m->triangle, 3 * (n + 1) * sizeof *m->triangle);
-	m->triangle_surface = realloc(m->triangle_surface, (n + 1) * sizeof(uint32_t));
-	m->triangle_uv = realloc(m->triangle_uv, 6 * (n + 1) * sizeof(float));
-	m->triangle_normal = realloc(m->triangle_normal, 9 * (n + 1) * sizeof(float));
+	m->triangle = one_more(m->triangle, n, 3 * sizeof *m->triangle);
+	m->triangle_surface = one_more(m->triangle_surface, n, sizeof(uint32_t));
+	m->triangle_uv = one_more(m->triangle_uv, n, 6 * sizeof(float));
+	m->triangle_normal = one_more(m->triangle_normal, n, 9 * sizeof(float));
 	m->triangle[3 * n] = a, m->triangle[3 * n + 1] = b, m->triangle[3 * n + 2] = c;
 	m->triangle_surface[n] = surface;
 	memset(&m->triangle_uv[6 * n], 0, 6 * sizeof(float));

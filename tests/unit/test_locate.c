@@ -18,7 +18,8 @@ static void agree(struct model *m, double patch, double element)
 	struct rng r = rng_seed(1, 2);
 	size_t other = 0, tries = 20000;
 
-	run(m, sizes(patch, element, 1));
+	struct mesher_report report = run(m, sizes(patch, element, 1));
+	mesher_report_free(&report);
 	assert_int_equal(locator_init(&l, m, &e), 0);
 	for (size_t i = 0; i < tries; i++) {
 		uint32_t t = (uint32_t)(rng_next(&r) % m->triangles);
