@@ -26,6 +26,9 @@ struct ray_scene {
 	double unit;        /* world length of one unit inside */
 	double per_unit;    /* 1 / unit */
 	float (*normal)[3]; /* [triangles] front normals */
+	size_t slivers;
+	uint32_t *sliver;   /* [slivers] triangles that are a geometry of their own */
+	double (*sliver_plane)[4]; /* [slivers] unit normal, offset, at unit scale */
 	int coherent;       /* packets of neighbouring rays pay as packets */
 };
 
@@ -36,6 +39,12 @@ static const double offset_units = 0x1p-21;
 /* Up to how many triangles a packet of rays with similar directions is best traced as
  * one; in larger scenes its rays part too soon. */
 enum { COHERENT_MOST = 1000 };
+
+enum { TRIANGLES, SLIVERS };  /* geometries */
+
+/* length^2 / height, at unit scale, beyond which a triangle is a sliver: half of the offset
+ * in float32 steps. */
+enum { SLIVER = 4 };
 
 static void bounds(const struct model *m, struct ray_scene *s)
 {
@@ -64,6 +73,91 @@ static void to_unit(const struct ray_scene *s, const double x[3], float out[3])
 		out[k] = (float)((x[k] - s->centre[k]) * s->per_unit);
 }
 
+/* Embree takes the plane of a triangle from the cross product of float32 edges: over the
+ * length of a sliver it is off by about length^2 / height float32 steps, and a ray may then
+ * hit the triangle that it has just left. */
+static int is_sliver(const struct ray_scene *s, const struct model *m, size_t triangle)
+{
+	const uint32_t *c = &m->triangle[3 * triangle];
+	double n[3], longest = 0;
+
+	v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
+	        &m->vertex[3 * (size_t)c[2]], n);
+	for (int k = 0; k < 3; k++) {
+		double d[3];
+		v3_sub(&m->vertex[3 * (size_t)c[(k + 1) % 3]], &m->vertex[3 * (size_t)c[k]], d);
+		longest = fmax(longest, v3_length(d));
+	}
+	return longest * longest * longest > SLIVER * s->unit * 2 * v3_length(n);
+}
+
+static int find_slivers(struct ray_scene *s, const struct model *m, struct err *e)
+{
+	for (size_t i = 0; i < m->triangles; i++)
+		s->slivers += (size_t)is_sliver(s, m, i);
+	s->sliver = mem_new(s->slivers, sizeof *s->sliver, "ray scene", e);
+	s->sliver_plane = mem_new(s->slivers, sizeof *s->sliver_plane, "ray scene", e);
+	if (!s->sliver || !s->sliver_plane)
+		return -1;
+	for (size_t i = 0, k = 0; i < m->triangles && k < s->slivers; i++) {
+		const uint32_t *c = &m->triangle[3 * i];
+		double *plane = s->sliver_plane[k], x[3];
+		if (!is_sliver(s, m, i))
+			continue;
+		s->sliver[k++] = (uint32_t)i;
+		v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
+		        &m->vertex[3 * (size_t)c[2]], plane);
+		v3_normalise(plane);
+		v3_sub(&m->vertex[3 * (size_t)c[0]], s->centre, x);
+		plane[3] = v3_dot(plane, x) * s->per_unit;
+	}
+	return 0;
+}
+
+/* Embree's filter: a ray does not meet a sliver whose plane it begins on. */
+static void leave_slivers(const struct RTCFilterFunctionNArguments *a)
+{
+	const struct ray_scene *s = a->geometryUserPtr;
+	/* Rows of N in the order of RTCRay and RTCHit: the origin comes first, primID sixth.
+	 * Embree has names for them in C++ only. */
+	const float *org = (const float *)a->ray;
+	const unsigned *primitive = (const unsigned *)a->hit + 5 * a->N;
+
+	for (unsigned i = 0; i < a->N; i++) {
+		if (!a->valid[i])
+			continue;
+		const double *plane = s->sliver_plane[primitive[i]];
+		double h = plane[0] * (double)org[i] + plane[1] * (double)org[a->N + i] +
+		           plane[2] * (double)org[2 * a->N + i] - plane[3];
+		if (fabs(h) < 1.5 * offset_units)
+			a->valid[i] = 0;
+	}
+}
+
+/* The slivers, with the vertices of the other geometry. */
+static int add_slivers(struct ray_scene *s, const struct model *m, RTCGeometry all, struct err *e)
+{
+	RTCGeometry g = rtcNewGeometry(s->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+	uint32_t *t = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+	                                      3 * sizeof *t, s->slivers);
+	int bad = !t && err_set(e, "Embree: no memory for %zu triangles", s->slivers);
+
+	if (!bad) {
+		rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+		                           rtcGetGeometryBufferData(all, RTC_BUFFER_TYPE_VERTEX, 0), 0,
+		                           3 * sizeof(float), m->vertices);
+		for (size_t k = 0; k < s->slivers; k++)
+			memcpy(&t[3 * k], &m->triangle[3 * (size_t)s->sliver[k]], 3 * sizeof *t);
+		rtcSetGeometryUserData(g, s);
+		rtcSetGeometryIntersectFilterFunction(g, leave_slivers);
+		rtcSetGeometryOccludedFilterFunction(g, leave_slivers);
+		rtcCommitGeometry(g);
+		rtcAttachGeometryByID(s->scene, g, SLIVERS);
+	}
+	rtcReleaseGeometry(g);
+	return bad ? -1 : 0;
+}
+
 static int fill_geometry(struct ray_scene *s, const struct model *m, RTCGeometry g,
                          struct err *e)
 {
@@ -76,6 +170,8 @@ static int fill_geometry(struct ray_scene *s, const struct model *m, RTCGeometry
 	for (size_t i = 0; i < m->vertices; i++)
 		to_unit(s, &m->vertex[3 * i], &v[3 * i]);
 	memcpy(t, m->triangle, 3 * m->triangles * sizeof *t);
+	for (size_t k = 0; k < s->slivers; k++) /* an edge is never hit */
+		t[3 * (size_t)s->sliver[k] + 1] = t[3 * (size_t)s->sliver[k] + 2] = t[3 * (size_t)s->sliver[k]];
 	for (size_t i = 0; i < m->triangles; i++) {
 		const uint32_t *c = &m->triangle[3 * i];
 		double n[3];
@@ -104,11 +200,14 @@ struct ray_scene *ray_scene_new(const struct model *m, struct err *e)
 		s->scene = rtcNewScene(s->device);
 		rtcSetSceneFlags(s->scene, RTC_SCENE_FLAG_ROBUST);
 		g = rtcNewGeometry(s->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-		bad = fill_geometry(s, m, g, e);
+		bad = find_slivers(s, m, e) || fill_geometry(s, m, g, e);
 	}
 	if (!bad) {
 		rtcCommitGeometry(g);
-		rtcAttachGeometry(s->scene, g);
+		rtcAttachGeometryByID(s->scene, g, TRIANGLES);
+		bad = s->slivers && add_slivers(s, m, g, e);
+	}
+	if (!bad) {
 		rtcCommitScene(s->scene);
 		if (rtcGetDeviceError(s->device) != RTC_ERROR_NONE)
 			bad = err_set(e, "Embree: could not build the ray scene");
@@ -131,6 +230,8 @@ void ray_scene_free(struct ray_scene *s)
 	if (s->device)
 		rtcReleaseDevice(s->device);
 	free(s->normal);
+	free(s->sliver);
+	free(s->sliver_plane);
 	free(s);
 }
 
@@ -175,8 +276,8 @@ void ray_nearest(const struct ray_scene *s, const double org[3], const double di
 	hit->triangle = RAY_MISS;
 	if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID)
 		return;
-	const float *n = s->normal[r.hit.primID];
-	hit->triangle = r.hit.primID;
+	hit->triangle = r.hit.geomID == SLIVERS ? s->sliver[r.hit.primID] : r.hit.primID;
+	const float *n = s->normal[hit->triangle];
 	hit->side = (double)n[0] * dir[0] + (double)n[1] * dir[1] + (double)n[2] * dir[2] > 0;
 	hit->t = (double)r.ray.tfar * s->unit;
 	hit->w[1] = (double)r.hit.u;
@@ -234,6 +335,9 @@ static void packet_cast(const struct ray_scene *s, struct ray_batch *b, uint32_t
 	rtcIntersect8(valid, s->scene, &context, &p);
 #endif
 	memcpy(&b->triangle[at], p.hit.primID, sizeof p.hit.primID);
+	for (uint32_t i = 0; s->slivers && i < PACKET; i++)
+		if (p.hit.geomID[i] == SLIVERS)
+			b->triangle[at + i] = s->sliver[p.hit.primID[i]];
 	memcpy(&b->w[0][at], p.hit.u, sizeof p.hit.u);
 	memcpy(&b->w[1][at], p.hit.v, sizeof p.hit.v);
 }
