@@ -26,6 +26,9 @@ struct cell {
  * have, too, and known edges end it. */
 static const double unproved = .1, unseen = .02, unlikely = 1e-4;
 
+/* What its centre says of a cell that is not compared yet: nothing better than this. */
+static const double surmised = 1e-3;
+
 enum { HALVINGS = 5 };        /* of the facet seen, to prove that several blockers hide it */
 
 /* An integral over facet f of what it sees of g. */
@@ -116,6 +119,16 @@ static int best_cut(const struct integral *in, struct cell *c, const struct face
 	return at;
 }
 
+/* The error of a cell's points where no edge is known to cross it: that of its centre
+ * alone is of second order, theirs of fourth. */
+static double surmise(const struct integral *in, const struct cell *c, const struct facet *f)
+{
+	double one = f->area * seen(&in->o->seer, f->centre, in->f->normal, in->g, c->blockers, in->e);
+	double off = c->value - one, guess = 4 * off * off / c->value;
+
+	return fmin(unproved, fmax(surmised, guess / c->most)) * c->most;
+}
+
 /* What the least error is that a measured cell can claim: more where edges of shadows are
  * known to cross it, where a corner sees what its points did not, or where it has not been
  * compared with its quarters. */
@@ -127,7 +140,7 @@ static double doubt(const struct integral *in, struct cell *c, const struct face
 	if (!in->cut || best_cut(in, c, f) >= 0)
 		return unseen * c->most;
 	if (!(dark || c->bright))
-		return compared ? 0 : unproved * c->most;
+		return compared ? 0 : surmise(in, c, f);
 	for (int k = 0; k < c->n; k++) {
 		double s = seen(&in->o->seer, c->v[k], in->f->normal, in->g, c->blockers, in->e);
 		double all = contour_point(c->v[k], in->f->normal, in->g->n, in->g->v);
@@ -234,6 +247,7 @@ static double integrate(struct integral *in, double tolerance, int most, double 
 static void make_blockers(struct occluded *o, const struct sight_line *l, const struct facet *g)
 {
 	o->blockers = 0;
+	memset(o->seer.apart, 0xff, sizeof o->seer.apart);
 	for (int i = 0; i < l->bodies; i++)
 		o->blockers += blocker_make(l->set, l->body[i], g, &o->seer.blocker[o->blockers]);
 }

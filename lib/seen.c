@@ -83,37 +83,65 @@ static void cut_piece(struct facet_piece *p, const double x[3], const double nor
 	copy_piece(p, &in);
 }
 
-/* Planes through x and the silhouette of a blocker, with its inside positive. -1 if x is
- * inside it, 0 if the eye sees it edge-on. */
-static int silhouette(const struct blocker *b, const double x[3], double near,
-                      double plane[BLOCKER_EDGES][3])
+/* Is the eye in front of a face? For a flat blocker: off its plane. */
+static int in_front(const struct blocker *b, int face, const double x[3], double near)
+{
+	if (face == b->faces)
+		return 0;
+	double h = plane_height(&b->face[face], x);
+	return b->flat ? h != 0 : h > near * 1e-6;
+}
+
+/* The plane through x and an edge, with the blocker's inside positive; 0 if x is in line. */
+static int edge_plane(const struct blocker *b, int edge, const double x[3], double plane[3])
 {
 	double centre[3], p[3], q[3];
+
+	v3_sub(b->centre, x, centre);
+	v3_sub(b->edge[edge].a, x, p);
+	v3_sub(b->edge[edge].b, x, q);
+	v3_cross(p, q, plane);
+	double side = v3_dot(plane, centre);
+	for (int k = 0; k < 3 && side < 0; k++)
+		plane[k] = -plane[k];
+	return side != 0;
+}
+
+/* Planes through x and the silhouette of a blocker, with its inside positive; edge[i] is
+ * the edge of plane i. -1 if x is inside it, 0 if the eye sees it edge-on. */
+static int silhouette(const struct blocker *b, const double x[3], double near,
+                      double plane[BLOCKER_EDGES][3], int edge[BLOCKER_EDGES])
+{
 	uint8_t front[BODY_FACES + 1] = { 0 };
 	int n = 0, any = 0;
 
-	for (int i = 0; i < b->faces; i++) {
-		double h = plane_height(&b->face[i], x);
-		front[i] = b->flat ? fabs(h) > 0 : h > near * 1e-6;
-		any |= front[i];
-	}
+	for (int i = 0; i < b->faces; i++)
+		any |= front[i] = (uint8_t)in_front(b, i, x, near);
 	if (!any)
 		return b->flat ? 0 : -1;
-	v3_sub(b->centre, x, centre);
-	for (int i = 0; i < b->edges; i++) {
-		if (!b->flat && front[b->edge[i].left] == front[b->edge[i].right])
-			continue;
-		v3_sub(b->edge[i].a, x, p);
-		v3_sub(b->edge[i].b, x, q);
-		v3_cross(p, q, plane[n]);
-		double side = v3_dot(plane[n], centre);
-		if (side == 0)
-			continue;
-		for (int k = 0; k < 3 && side < 0; k++)
-			plane[n][k] = -plane[n][k];
-		n++;
-	}
+	for (int i = 0; i < b->edges; i++)
+		if (b->flat || front[b->edge[i].left] != front[b->edge[i].right]) {
+			edge[n] = i;
+			n += edge_plane(b, i, x, plane[n]);
+		}
 	return n;
+}
+
+/* Is all that is visible on the far side of an edge that was so for the last eye? */
+static int still_apart(const struct seer *o, int blocker, const double x[3])
+{
+	const struct blocker *b = &o->blocker[blocker];
+	int edge = o->apart[blocker];
+	double plane[3], h[PIECE_CORNERS];
+
+	if (edge < 0 || (!b->flat && in_front(b, b->edge[edge].left, x, o->near) ==
+	                             in_front(b, b->edge[edge].right, x, o->near)) ||
+	    !edge_plane(b, edge, x, plane))
+		return 0;
+	for (size_t i = 0; i < o->piece.n; i++)
+		if (heights((const struct facet_piece *)o->piece.data + i, x, plane, h) & 1)
+			return 0;
+	return 1;
 }
 
 /* Room for one more piece behind those of a list; NULL and e when memory is short. */
@@ -125,11 +153,14 @@ static struct facet_piece *more(struct vec *list, struct err *e)
 }
 
 /* Takes from the visible pieces what a blocker hides from x. */
-static int hide(struct seer *o, const struct blocker *b, const double x[3], struct err *e)
+static int hide(struct seer *o, int blocker, const double x[3], struct err *e)
 {
 	double plane[BLOCKER_EDGES][3];
-	int n = silhouette(b, x, o->near, plane);
+	int edge[BLOCKER_EDGES], n, hid = 0;
 
+	if (still_apart(o, blocker, x))
+		return 0;
+	n = silhouette(&o->blocker[blocker], x, o->near, plane, edge);
 	if (n < 0) {
 		o->piece.n = 0;
 		o->hid = 1;
@@ -147,9 +178,12 @@ static int hide(struct seer *o, const struct blocker *b, const double x[3], stru
 				return -1;
 			cut_piece(p, x, plane[k], away);
 			o->next.n += away->n >= 3;
+			if (!p->n)
+				o->apart[blocker] = edge[k];
 		}
-		o->hid |= p->n >= 3;
+		hid |= p->n >= 3;
 	}
+	o->hid |= hid;
 	struct vec swap = o->piece;
 	o->piece = o->next;
 	o->next = swap;
@@ -170,7 +204,7 @@ double seen(struct seer *o, const double x[3], const double normal[3], const str
 	memcpy(whole->v, g->v, (size_t)g->n * sizeof whole->v[0]);
 	o->piece.n = 1;
 	for (uint64_t left = blockers; left && o->piece.n; left &= left - 1)
-		if (hide(o, &o->blocker[__builtin_ctzll(left)], x, e))
+		if (hide(o, __builtin_ctzll(left), x, e))
 			return NAN;
 	for (size_t i = 0; i < o->piece.n; i++) {
 		const struct facet_piece *p = (const struct facet_piece *)o->piece.data + i;
