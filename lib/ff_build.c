@@ -364,6 +364,9 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 	int formula = o->method == FF_ANALYTIC || o->method == FF_AUTO;
 	int matrix = !bad && formula && o->to_patches && ff_matrix_can(&job);
 
+	if (!bad && o->close && !matrix)
+		bad = err_set(e, "--close needs factors to patches by formula (-m auto --to patches) "
+		              "in a model of plane patches without lobes, mirrors and panes");
 	*stats = (struct ff_stats){ 0 };
 	*whole = (struct ff){ .part = o->part, .parts = o->parts };
 	whole->patch_begin = (uint32_t)((uint64_t)m->patches * (o->part - 1) / o->parts);

@@ -20,6 +20,7 @@ struct ff_options {
 	uint64_t seed;
 	double target;        /* analytic: absolute error of a partly hidden factor */
 	int evaluations;      /* analytic: the most spent on one */
+	int close;            /* formulas to patches: closed rows are made to add up */
 	int to_patches;       /* columns are patch-sides */
 	int f64;
 	uint32_t part, parts; /* 1-based shard */

@@ -5,18 +5,13 @@
 #include <string.h>
 
 #include "exchange.h"
+#include "ff_close.h"
 #include "ff_exact.h"
 #include "lobe.h"
 #include "vec3.h"
 
 enum { BAND_BYTES = 192 << 20, ROWS_AT_A_TIME = 64, TILE = 32, REST_RAYS = 256,
-       CROWD_RAYS = 1024 };
-
-/* A factor whose error is not just the relative one of all. */
-struct doubt {
-	uint32_t i, j;                /* sides, i < j */
-	double error;                 /* of the exchange area */
-};
+       CROWD_RAYS = 1024, CERTAIN = 4 };
 
 struct thread {
 	struct exchanger x;
@@ -37,8 +32,9 @@ struct matrix {
 	size_t first, rows;
 	float *e32;                   /* [rows][n] exchange areas, one of them */
 	double *e64;
-	double *variance, *doubts;    /* [rows] sums of squared errors, and of errors, of
-	                                 exchange areas */
+	struct exact_row *row;        /* [rows] */
+	uint8_t *closed;              /* [rows] what leaves the side arrives on sides */
+	struct vec doubt;             /* struct doubt, by pair */
 };
 
 static double get(const struct matrix *m, size_t row, size_t j)
@@ -109,33 +105,21 @@ static int by_pair(const void *a, const void *b)
 	return (x->j > y->j) - (x->j < y->j);
 }
 
-/* Squared errors by row, added up in an order that does not depend on threads. */
+/* The doubts of all threads, in an order that does not depend on them. */
 static int gather_doubts(struct matrix *m, struct err *e)
 {
-	struct vec all = { 0 };
-	int bad = 0;
-
-	for (int t = 0; t < m->job->o.threads && !bad; t++) {
+	m->doubt.n = 0;
+	for (int t = 0; t < m->job->o.threads; t++) {
 		struct vec *v = &m->thread[t].doubt;
-		bad = m->thread[t].e.set ? err_set(e, "%s", m->thread[t].e.text)
-		                         : vec_append(&all, v->data, v->n, sizeof(struct doubt), e);
+		if (m->thread[t].e.set)
+			return err_set(e, "%s", m->thread[t].e.text);
+		if (vec_append(&m->doubt, v->data, v->n, sizeof(struct doubt), e))
+			return -1;
 		v->n = 0;
 	}
-	if (!bad && all.n)
-		qsort(all.data, all.n, sizeof(struct doubt), by_pair);
-	memset(m->variance, 0, m->rows * sizeof *m->variance);
-	memset(m->doubts, 0, m->rows * sizeof *m->doubts);
-	for (size_t k = 0; !bad && k < all.n; k++) {
-		const struct doubt *d = (const struct doubt *)all.data + k;
-		const uint32_t end[2] = { d->i, d->j };
-		for (int s = 0; s < 2; s++)
-			if (end[s] >= m->first && end[s] < m->first + m->rows) {
-				m->variance[end[s] - m->first] += d->error * d->error;
-				m->doubts[end[s] - m->first] += d->error;
-			}
-	}
-	free(all.data);
-	return bad;
+	if (m->doubt.n)
+		qsort(m->doubt.data, m->doubt.n, sizeof(struct doubt), by_pair);
+	return 0;
 }
 
 /* ---- rows ---- */
@@ -164,11 +148,77 @@ static void rest(const struct matrix *m, uint32_t ps, uint32_t *escapes, uint32_
 	}
 }
 
+/* What a row says beside its values. What is missing of a closed row is its error; of
+ * others, what nothing received. */
+static void judge(struct matrix *m, size_t r)
+{
+	struct exact_row *row = &m->row[r];
+	double area = m->area[m->first + r], sum = 0;
+	uint32_t escapes = 0, blacks = 0;
+
+	for (size_t j = 0; j < m->n; j++)
+		sum += get(m, r, j) / area;
+	row->side = m->side[m->first + r];
+	row->residual = 1 - sum;
+	row->error = row->error / area + m->thread[0].x.o.relative * sum;
+	if (row->residual > 0)
+		rest(m, row->side, &escapes, &blacks);
+	m->closed[r] = !(escapes + blacks) && row->residual <= CERTAIN * row->error;
+	if (m->closed[r])
+		return;
+	row->black = escapes + blacks ? row->residual * blacks / (escapes + blacks) : 0;
+	row->escape = row->residual - row->black;
+	row->residual = 0;
+}
+
+static void judge_rows(void *arg, size_t begin, size_t end, int thread)
+{
+	(void)thread;
+	for (size_t r = begin; r < end; r++)
+		judge(arg, r);
+}
+
+static void judge_all(struct matrix *m)
+{
+	const struct doubt *d = m->doubt.data;
+
+	memset(m->row, 0, m->rows * sizeof *m->row);
+	for (size_t k = 0; k < m->doubt.n; k++) {
+		size_t i = d[k].i - m->first, j = d[k].j - m->first; /* beyond rows if outside */
+		if (i < m->rows)
+			m->row[i].error += d[k].error;
+		if (j < m->rows)
+			m->row[j].error += d[k].error;
+	}
+	par_for(m->rows, 16, m->job->o.threads, judge_rows, m, NULL);
+}
+
+/* Takes the residuals of closed rows out of the factors that are in doubt. The matrix is
+ * whole: first is 0. */
+static int close_rows(struct matrix *m, struct err *e)
+{
+	const struct doubt *d = m->doubt.data;
+	double *missing = mem_new(m->rows, sizeof *missing, "closing rows", e);
+	double *change = mem_new(m->doubt.n, sizeof *change, "closing rows", e);
+	int bad = !missing || !change;
+
+	for (size_t r = 0; !bad && r < m->rows; r++)
+		missing[r] = m->closed[r] ? m->row[r].residual * m->area[r] : 0;
+	bad = bad || ff_close(d, m->doubt.n, m->rows, missing, m->closed, change, e);
+	for (size_t k = 0; !bad && k < m->doubt.n; k++) {
+		double x = fmax(0, get(m, d[k].i, d[k].j) + change[k]);
+		set(m, d[k].i, d[k].j, x);
+		set(m, d[k].j, d[k].i, x);
+	}
+	free(missing);
+	free(change);
+	return bad ? -1 : 0;
+}
+
 static int put_row(struct ff_batch *b, const struct matrix *m, size_t r, struct err *e)
 {
-	uint32_t ps = m->side[m->first + r];
-	double area = m->area[m->first + r], sum = 0;
-	struct exact_row row = { .side = ps };
+	struct exact_row *row = &m->row[r];
+	double area = m->area[m->first + r], sum = row->escape + row->black;
 
 	if (vec_reserve(&b->column, m->n, sizeof(uint32_t), e) ||
 	    vec_reserve(&b->value, m->n, b->f64 ? sizeof(double) : sizeof(float), e))
@@ -178,22 +228,8 @@ static int put_row(struct ff_batch *b, const struct matrix *m, size_t r, struct 
 		if (x > 0)
 			sum += batch_put_value(b, m->side[j], x / area);
 	}
-	double relative = m->thread[0].x.o.relative;
-	row.error = m->doubts[r] / area + relative * sum;
-	row.residual = 1 - sum;
-	/* What is missing of a closed row is its error, of others what nothing received. */
-	if (row.residual > 0) {
-		uint32_t escapes, blacks;
-		rest(m, ps, &escapes, &blacks);
-		if (escapes + blacks || row.residual > m->doubts[r] / area + 2 * relative * sum) {
-			double all = escapes + blacks ? escapes + blacks : 1;
-			row.black = row.residual * blacks / all;
-			row.escape = row.residual - row.black;
-			row.residual = 0;
-		}
-	}
-	row.scale = 1 / (sum + row.escape + row.black);
-	return batch_put_exact(b, &row, e);
+	row->scale = sum > 0 ? 1 / sum : 0;
+	return batch_put_exact(b, row, e);
 }
 
 static int emit(struct matrix *m, const struct ff_sink *sink, struct ff_stats *stats,
@@ -226,9 +262,12 @@ static int bands(struct matrix *m, size_t begin, size_t end, const struct ff_sin
 
 	most = most < 1 ? 1 : most < end - begin ? most : end - begin;
 	void *room = mem_new(most * m->n, size, "exchange areas", e);
-	m->variance = mem_new(most, sizeof *m->variance, "exchange areas", e);
-	m->doubts = mem_new(most, sizeof *m->doubts, "exchange areas", e);
-	if (!room || !m->variance || !m->doubts) {
+	m->row = mem_new(most, sizeof *m->row, "exchange areas", e);
+	m->closed = mem_new(most, 1, "exchange areas", e);
+	if (m->job->o.close && most < m->n)
+		err_set(e, "--close needs all rows at once: no --part, and at most about %zu "
+		        "patch-sides", (size_t)sqrt(BAND_BYTES / (double)size));
+	if (!room || !m->row || !m->closed || e->set) {
 		free(room);
 		return -1;
 	}
@@ -241,7 +280,10 @@ static int bands(struct matrix *m, size_t begin, size_t end, const struct ff_sin
 			memset(room, 0, most * m->n * size);
 		par_for(m->rows, 1, m->job->o.threads, do_rows, m, progress);
 		mirror(m);
-		bad = gather_doubts(m, e) || emit(m, sink, stats, e);
+		if ((bad = gather_doubts(m, e)))
+			break;
+		judge_all(m);
+		bad = (m->job->o.close && close_rows(m, e)) || emit(m, sink, stats, e);
 	}
 	free(room);
 	return bad;
@@ -304,8 +346,9 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
 	free(m.thread);
 	free(m.side);
 	free(m.area);
-	free(m.variance);
-	free(m.doubts);
+	free(m.row);
+	free(m.closed);
+	free(m.doubt.data);
 	facet_set_free(&m.facets);
 	body_set_free(&m.bodies);
 	return bad ? -1 : 0;

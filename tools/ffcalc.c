@@ -14,7 +14,7 @@
 #include "common/cli.h"
 
 enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GAIN, OPT_GATHER,
-       OPT_TO };
+       OPT_TO, OPT_CLOSE };
 
 static const struct cli_option options[] = {
 	{ 'o', "output", "FILE", "write the form factors to FILE (.ff)" },
@@ -23,6 +23,7 @@ static const struct cli_option options[] = {
 	{ 'p', "points", "N", "hemicubes a patch-side (default 16)" },
 	{ 't', "target", "X", "formulas: absolute error of a factor that is partly hidden (default 1e-4, to patches 1e-6)" },
 	{ OPT_TO, "to", "WHAT", "elements or patches: what receives (default elements)" },
+	{ OPT_CLOSE, "close", NULL, "formulas to patches: change what is in doubt so that closed rows add up" },
 	{ OPT_GAIN, "emitter-gain", "N", "times as many rays for emitters (default 8)" },
 	{ OPT_GATHER, "gather", "N", "rays an element-side gathers with (default a sixteenth of -n)" },
 	{ OPT_LOBE_RAYS, "lobe-rays", "N", "rays a patch-side for each directional lobe (default 4096)" },
@@ -84,6 +85,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		case OPT_TO: parse_word(c, "--to", optarg, "patches", "elements", &o->to_patches); break;
 		case 'n': n = cli_integer(c, "--samples", optarg, 4, 1 << 26); break;
 		case 'p': o->points = (uint32_t)cli_integer(c, "--points", optarg, 1, 4096); break;
+		case OPT_CLOSE: o->close = 1; break;
 		case OPT_GAIN: o->emitter_gain = (uint32_t)cli_integer(c, "--emitter-gain", optarg, 1, 4096); break;
 		case OPT_GATHER: gather = cli_integer(c, "--gather", optarg, 0, 1 << 20); break;
 		case OPT_LOBE_RAYS: o->lobe_rays = (uint32_t)cli_integer(c, "--lobe-rays", optarg, 1, 1 << 26); break;
@@ -125,6 +127,8 @@ static json_t *options_json(const struct ff_options *o)
 	json_object_set_new(j, "emitter_gain", json_integer(o->emitter_gain));
 	if (o->to_patches)
 		json_object_set_new(j, "to", json_string("patches"));
+	if (o->close)
+		json_object_set_new(j, "close", json_true());
 	if (o->method == FF_ANALYTIC || o->method == FF_AUTO)
 		json_object_set_new(j, "target", json_real(o->target));
 	if (o->method == FF_HEMICUBE)
