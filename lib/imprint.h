@@ -52,15 +52,15 @@ struct pieces {
 };
 
 /* cut.c: divides the triangles of m so that their contacts are edges of pieces, flipped
- * towards Delaunay's criterion elsewhere. No vertex ever lies inside an edge of its
- * surface. Expected O(contacts x pieces of a triangle) at worst. p zeroed, to be freed
- * in any case. 0, or -1 and e. */
+ * towards Delaunay's criterion and refined elsewhere. No vertex ever lies inside an edge of
+ * its surface. O(contacts x pieces of a triangle) at worst. p zeroed, to be freed in any
+ * case. 0, or -1 and e. */
 int cut_triangles(const struct model *m, const struct edges *g, const struct contacts *c,
                   const struct imprint_limits *limits, struct pieces *p, struct err *e);
 
-/* tear.c: pieces become the triangles of m, their vertices its vertices. Vertices are doubled along lines, so that
- * nothing that follows shared edges or vertices crosses them. *lines = edges of pieces
- * along lines. 0, or -1 and e. O(n log n). */
+/* tear.c: pieces become the triangles of m, their vertices its vertices. These are doubled
+ * along lines, so that nothing that follows shared edges or vertices crosses them.
+ * *lines = edges of pieces along lines. 0, or -1 and e. O(n log n). */
 int tear_lines(struct model *m, struct pieces *p, size_t *lines, struct err *e);
 
 #endif
