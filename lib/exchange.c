@@ -12,6 +12,7 @@ void exchanger_init(struct exchanger *x, const struct exchange_options *o,
                     const double centre[3])
 {
 	*x = (struct exchanger){ .o = *o, .bodies = bodies, .rays = rays, .centre = centre };
+	x->sight.most = o->bodies < SIGHT_BLOCKERS ? o->bodies : SIGHT_BLOCKERS;
 	clear_init(&x->clear, o->relative);
 }
 

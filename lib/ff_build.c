@@ -9,7 +9,7 @@
 #include "ff_matrix.h"
 #include "vec3.h"
 
-enum { FORMULA_EVALUATIONS = 1000, PATCHES_AT_A_TIME = 64, SOBOL_POINTS_MAX = 1 << 16 };
+enum { FORMULA_EVALUATIONS = 1000, FORMULA_BODIES = 8, PATCHES_AT_A_TIME = 64, SOBOL_POINTS_MAX = 1 << 16 };
 
 /* Of what nothing hides, by formula to elements: finer than any picture shows. */
 static const double FORMULA_ERROR = 1e-5;
@@ -173,7 +173,8 @@ static void job_free(struct ff_job *j)
 
 static int thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e)
 {
-	const struct exchange_options o = { FORMULA_ERROR, j->o.target, FORMULA_EVALUATIONS, 0 };
+	const struct exchange_options o = { FORMULA_ERROR, j->o.target, FORMULA_EVALUATIONS,
+	                                    FORMULA_BODIES, 0 };
 
 	*t = (struct ff_thread){ .job = j };
 	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, e))

@@ -323,7 +323,8 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
 {
 	struct matrix m = { .job = j };
 	struct exchange_options o = { .relative = j->o.f64 ? 1e-9 : 4e-7, .absolute = j->o.target,
-	                              .most = j->o.evaluations, .crowd_rays = CROWD_RAYS };
+	                              .most = j->o.evaluations, .bodies = SIGHT_BLOCKERS,
+	                              .crowd_rays = CROWD_RAYS };
 	size_t a = 0, b;
 	int bad = find_sides(&m, e) || facet_set_init(&m.facets, j->m, FACETS_OF_PATCHES, e) ||
 	          body_set_init(&m.bodies, j->m, e);

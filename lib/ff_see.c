@@ -17,6 +17,9 @@ static const double plenty = .04;
  * one by chance, which keeps the expectation. */
 static const double faint = .25;
 
+/* ... and is worth a formula if by as many rays. */
+static const double worth = 1;
+
 /* The form factor per area between two points. */
 static double kernel(const double x[3], const double nx[3], const double y[3],
                      const double ny[3])
@@ -188,8 +191,10 @@ static struct ff_sight sight(struct ff_thread *t, uint32_t source, uint32_t colu
 	double odds = fmin(1, o.want / faint), e, off;
 	uint32_t n = 1;
 
-	if (ff_formula_has(&t->job->formula, source) &&
-	    ff_formula_exchange(t->formula, &t->job->formula, source, column, &e, &off, &t->tally.err)) {
+	if ((t->job->formula.all || o.close || o.want >= worth) &&
+	    ff_formula_has(&t->job->formula, source) &&
+	    ff_formula_exchange(t->formula, &t->job->formula, source, column, &e, &off,
+	                        &t->tally.err)) {
 		double area = t->job->m->patch_area[source >> 1];
 		return (struct ff_sight){ column, e / area, off / area * (off / area) };
 	}

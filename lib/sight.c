@@ -117,6 +117,20 @@ static double box_above(const double lo[3], const double hi[3], const struct fac
 	return h;
 }
 
+/* Is a box beyond one of the shaft's planes? */
+static int box_outside(const struct sight_line *l, const double lo[3], const double hi[3])
+{
+	for (int p = 0; p < l->planes; p++) {
+		const struct plane *s = &l->shaft[p];
+		double h = -s->offset;
+		for (int k = 0; k < 3; k++)
+			h += s->normal[k] * (s->normal[k] > 0 ? lo[k] : hi[k]);
+		if (h >= -l->set->near)
+			return 1;
+	}
+	return 0;
+}
+
 /* Bodies that the box and the planes of both facets do not rule out. 0 if there are too
  * many. */
 static int collect(struct sight_line *l)
@@ -129,7 +143,7 @@ static int collect(struct sight_line *l)
 	while (depth) {
 		const struct body_node *n = &s->node[stack[--depth]];
 		if (apart(l, n->lo, n->hi) || box_above(n->lo, n->hi, l->a) <= s->near ||
-		    box_above(n->lo, n->hi, l->b) <= s->near)
+		    box_above(n->lo, n->hi, l->b) <= s->near || box_outside(l, n->lo, n->hi))
 			continue;
 		if (n->right) {
 			stack[depth++] = n->right;
@@ -138,13 +152,14 @@ static int collect(struct sight_line *l)
 		}
 		for (uint32_t i = n->first; i < n->first + n->count; i++) {
 			const struct body *b = &s->body[i];
-			if (apart(l, b->lo, b->hi) || behind_facet(s, b, l->a) || behind_facet(s, b, l->b))
+			if (apart(l, b->lo, b->hi))
 				continue;
 			if (!l->planes)
 				l->planes = shaft_planes(l->a, l->b, s->near, l->shaft);
-			if (outside_shaft(l, b))
+			if (box_outside(l, b->lo, b->hi) || behind_facet(s, b, l->a) ||
+			    behind_facet(s, b, l->b) || outside_shaft(l, b))
 				continue;
-			if (l->bodies == SIGHT_BLOCKERS)
+			if (l->bodies == l->most)
 				return 0;
 			l->body[l->bodies++] = i;
 		}

@@ -33,10 +33,10 @@ struct sight_line {
 	int planes;
 	double lo[3], hi[3];      /* box of both */
 	uint32_t body[SIGHT_BLOCKERS];
-	int bodies;
+	int bodies, most;         /* most: how many are let in before it is a crowd */
 };
 
-/* Looks from a to b, which lie in front of one another. With SIGHT_PART the bodies that
+/* Looks from a to b, which lie in front of one another; l->most is set. With SIGHT_PART the bodies that
  * may hide something are in l->body. O(log bodies + bodies between x corners). */
 enum sight sight_find(struct sight_line *l, const struct body_set *set, const struct facet *a,
                       const struct facet *b);
