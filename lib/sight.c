@@ -78,6 +78,16 @@ static int behind_facet(const struct body_set *s, const struct body *b, const st
 	return 1;
 }
 
+/* Is a facet in a solid, or a part of its faces, as a whole? */
+static int holds(const struct body_set *s, const struct body *b, const struct facet *f)
+{
+	for (uint32_t i = 0; i < b->faces && !b->flat; i++)
+		for (int c = 0; c < f->n; c++)
+			if (plane_height(&s->face[b->face + i], &f->v[3 * c]) > s->near)
+				return 0;
+	return !b->flat;
+}
+
 static int outside_shaft(const struct sight_line *l, const struct body *b)
 {
 	const double *x = &l->set->corner[3 * (size_t)b->corner];
@@ -138,7 +148,8 @@ static int collect(struct sight_line *l)
 		}
 		for (uint32_t i = n->first; i < n->first + n->count; i++) {
 			const struct body *b = &s->body[i];
-			if (apart(l, b->lo, b->hi) || behind_facet(s, b, l->a) || behind_facet(s, b, l->b))
+			if (apart(l, b->lo, b->hi) || behind_facet(s, b, l->a) || behind_facet(s, b, l->b) ||
+			    (holds(s, b, l->a) && holds(s, b, l->b)))
 				continue;
 			if (!l->planes)
 				l->planes = shaft_planes(l->a, l->b, s->near, l->shaft);
