@@ -8,6 +8,7 @@
 
 #include "../../lib/facet.h"
 #include "../../lib/model.h"
+#include "../../lib/rng.h"
 #include "../../lib/vec3.h"
 
 enum { BRUTE_CORNERS = 48, BRUTE_PIECES = 4096, BRUTE_TRIANGLES = 2048 };
@@ -22,6 +23,7 @@ struct brute {
 	int triangles;
 	const struct facet *f, *g;
 	double evaluations;
+	uint64_t dice;
 	struct brute_piece piece[2][BRUTE_PIECES];
 };
 
@@ -150,8 +152,7 @@ static inline double brute_point(struct brute *b, const double x[3])
 }
 
 /* Dunavant's rule of degree 5 (7 points) over a triangle. */
-static inline double brute_rule(struct brute *b, const double a[3], const double u[3],
-                                const double v[3])
+static inline double brute_rule(struct brute *b, const double t[3][3])
 {
 	static const double at[7][3] = { { 1. / 3, 1. / 3, .225 },
 		{ .470142064105115, .470142064105115, .132394152788506 },
@@ -162,48 +163,55 @@ static inline double brute_rule(struct brute *b, const double a[3], const double
 		{ .101286507323456, .797426985353087, .125939180544827 } };
 	double n[3], sum = 0;
 
-	v3_cross(u, v, n);
+	v3_area(t[0], t[1], t[2], n);
 	for (int i = 0; i < 7; i++) {
 		double x[3];
 		for (int k = 0; k < 3; k++)
-			x[k] = a[k] + at[i][0] * u[k] + at[i][1] * v[k];
+			x[k] = t[0][k] + at[i][0] * (t[1][k] - t[0][k]) + at[i][1] * (t[2][k] - t[0][k]);
 		sum += at[i][2] * brute_point(b, x);
 	}
-	return sum * v3_length(n) / 2;
+	return sum * v3_length(n);
 }
 
-static inline double brute_refine(struct brute *b, const double a[3], const double u[3],
-                                  const double v[3], double whole, double tolerance, int depth)
+/* Edges are not halved, so that no line can miss the points of all levels. */
+static inline double brute_refine(struct brute *b, const double t[3][3], double whole,
+                                  double tolerance, int depth)
 {
-	double part[4], sum = 0, h[2][3], p[3], q[3], r[3], minus[2][3];
+	double m[3][3], part[4], sum = 0;
 
-	for (int k = 0; k < 3; k++) {
-		h[0][k] = u[k] / 2, h[1][k] = v[k] / 2;
-		minus[0][k] = -h[0][k], minus[1][k] = -h[1][k];
-		p[k] = a[k] + h[0][k], q[k] = a[k] + h[1][k], r[k] = p[k] + h[1][k];
+	for (int i = 0; i < 3; i++) {
+		b->dice = rng_mix(b->dice);
+		double w = .35 + .3 * (double)(b->dice >> 11) * 0x1p-53;
+		for (int k = 0; k < 3; k++)
+			m[i][k] = t[i][k] + w * (t[(i + 1) % 3][k] - t[i][k]);
 	}
-	sum += part[0] = brute_rule(b, a, h[0], h[1]);
-	sum += part[1] = brute_rule(b, p, h[0], h[1]);
-	sum += part[2] = brute_rule(b, q, h[0], h[1]);
-	sum += part[3] = brute_rule(b, r, minus[0], minus[1]);
-	if (depth <= 0 && (fabs(sum - whole) <= tolerance || depth <= -14))
+	double kid[4][3][3];
+	for (int i = 0; i < 4; i++)
+		for (int j = 0; j < 3; j++)
+			memcpy(kid[i][j], i == 3 ? m[j] : j == 0 ? t[i] : j == 1 ? m[i] : m[(i + 2) % 3],
+			       sizeof kid[i][j]);
+	for (int i = 0; i < 4; i++)
+		sum += part[i] = brute_rule(b, (const double (*)[3])kid[i]);
+	if (depth <= 0 && (fabs(sum - whole) <= tolerance || depth <= -12))
 		return sum;
-	return brute_refine(b, a, h[0], h[1], part[0], tolerance / 2, depth - 1) +
-	       brute_refine(b, p, h[0], h[1], part[1], tolerance / 2, depth - 1) +
-	       brute_refine(b, q, h[0], h[1], part[2], tolerance / 2, depth - 1) +
-	       brute_refine(b, r, minus[0], minus[1], part[3], tolerance / 2, depth - 1);
+	sum = 0;
+	for (int i = 0; i < 4; i++)
+		sum += brute_refine(b, (const double (*)[3])kid[i], part[i], tolerance / 2, depth - 1);
+	return sum;
 }
 
-/* Exchange area: f is cut into 4^levels triangles each way at least, then adaptively. */
+/* Exchange area: f is cut into 4^levels triangles at least, then adaptively. */
 static inline double brute_exchange(struct brute *b, double tolerance, int levels)
 {
 	double sum = 0;
 
+	b->dice = 1;
 	for (int i = 1; i + 1 < b->f->n; i++) {
-		double u[3], v[3];
-		v3_sub(&b->f->v[3 * i], b->f->v, u);
-		v3_sub(&b->f->v[3 * i + 3], b->f->v, v);
-		sum += brute_refine(b, b->f->v, u, v, brute_rule(b, b->f->v, u, v),
+		double t[3][3];
+		memcpy(t[0], b->f->v, sizeof t[0]);
+		memcpy(t[1], &b->f->v[3 * i], sizeof t[0]);
+		memcpy(t[2], &b->f->v[3 * i + 3], sizeof t[0]);
+		sum += brute_refine(b, (const double (*)[3])t, brute_rule(b, (const double (*)[3])t),
 		                    tolerance / b->f->n, levels);
 	}
 	return sum;

@@ -99,7 +99,7 @@ static inline void scene_cuboid(struct model *m, const double corner[3], const d
 		if (!(faces >> face & 1))
 			continue;
 		v3_mad(corner, face & 1, side[face / 2], at);
-		int swap = !(face & 1) != inwards;
+		int swap = (face & 1) == inwards;
 		scene_grid(m, at, swap ? v : u, swap ? u : v, k);
 	}
 }
