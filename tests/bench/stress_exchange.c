@@ -193,7 +193,7 @@ static void one(uint64_t seed, uint32_t i, uint32_t j)
 	struct facet a, c;
 	front(f, g, bodies.near, &room[0], &a);
 	front(g, f, bodies.near, &room[1], &c);
-	printf("sight %d, bodies", sight_find(&l, &bodies, &a, &c));
+	printf("sight %d, bodies", (int)sight_find(&l, &bodies, &a, &c));
 	for (int k = 0; k < l.bodies; k++) {
 		const struct body *o = &bodies.body[l.body[k]];
 		printf("\n  %s, %u corners:", o->flat ? "flat" : "solid", o->corners);

@@ -116,20 +116,18 @@ static inline double brute_point(struct brute *b, const double x[3])
 		m = 0;
 		for (int i = 0; i < n; i++) {
 			struct brute_piece rest = now[i], away;
+			int before = m, edge_on = 0;
 			for (int e = 0; e < tri.n && rest.n; e++) {
 				double p[3], q[3], plane[3], out[3];
 				v3_sub(tri.v[e], x, p);
 				v3_sub(tri.v[(e + 1) % tri.n], x, q);
 				v3_cross(p, q, plane);
-				if (!(v3_normalise(plane) > 0))
+				v3_sub(q, p, out);
+				/* Corners of no distance, as clipping makes them. */
+				if (v3_length(out) < 1e-10 || !(v3_normalise(plane) > 0))
 					continue;
 				double side = v3_dot(plane, inner);
-				if (fabs(side) < 1e-13 * v3_length(inner)) { /* edge-on */
-					if (m < BRUTE_PIECES)
-						next[m++] = rest;
-					rest.n = 0;
-					break;
-				}
+				edge_on |= fabs(side) < 1e-13 * v3_length(inner);
 				for (int k = 0; k < 3; k++) {
 					plane[k] = side > 0 ? plane[k] : -plane[k];
 					out[k] = -plane[k];
@@ -139,6 +137,10 @@ static inline double brute_point(struct brute *b, const double x[3])
 				brute_clip(&rest, plane, offset, &rest);
 				if (away.n && m < BRUTE_PIECES)
 					next[m++] = away;
+			}
+			if (edge_on || !rest.n) { /* nothing is hidden: in one piece again */
+				m = before;
+				next[m++] = now[i];
 			}
 		}
 		swap = now;

@@ -98,8 +98,8 @@ static inline void random_thing(struct model *m, struct dice *d)
 		at[2] = 0;
 		random_box(m, d, at, size, 1, NO_BOTTOM);
 		break;
-	case 1:
-		at[2] = 0;
+	case 1: /* a bottom that is seen from inside is not the floor */
+		at[2] = m->material.one_sided[0] ? 0 : .01;
 		random_box(m, d, at, size, 1, ALL_FACES);
 		break;
 	case 2: random_box(m, d, at, .6 * size, 0, ALL_FACES); break;
