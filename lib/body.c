@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "body_inside.h"
 #include "body_polygons.h"
-#include "body_solids.h"
 #include "edges.h"
 
 enum { LEAF = 2 };
@@ -67,6 +67,14 @@ static int on_hull(const struct polygons *p, const struct plane *plane)
 		below |= h < -p->near;
 	}
 	return !(above && below);
+}
+
+static int all_on_hull(const struct polygons *p, const struct solid *s)
+{
+	for (size_t i = 0; i < s->polygons; i++)
+		if (!on_hull(p, &((const struct polygon *)p->polygon.data)[s->polygon[i]].plane))
+			return 0;
+	return 1;
 }
 
 static int put_flat(struct maker *k, uint32_t polygon)
@@ -146,7 +154,8 @@ static int put_group(struct maker *k, const uint32_t *polygon, size_t n)
 	                   .sides = k->first_side[k->set[polygon[0]] + 1] -
 	                            k->first_side[k->set[polygon[0]]] };
 
-	if (n > 2 && solid_check(&k->p, &s))
+	if (n > 2 && solid_check(&k->p, &s) && !all_on_hull(&k->p, &s) &&
+	    solid_is_opaque(&k->p, &s, k->set))
 		return put_solid(k, &s);
 	for (size_t i = 0; i < n; i++)
 		if (put_flat(k, polygon[i]))

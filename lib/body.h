@@ -2,7 +2,8 @@
  * bodies as come by cheaply. Connected coplanar triangles with a convex outline are one
  * flat body; flat bodies that close a convex solid, but for one face at most (a block
  * without a bottom), are one solid body. Planes that have the whole scene on one side
- * block nothing and are left out. */
+ * block nothing and are left out. A solid that something may look out of, or about in,
+ * from a place that is not in it as a whole is left as its faces. */
 #ifndef TWOPASS_BODY_H
 #define TWOPASS_BODY_H
 
@@ -50,7 +51,7 @@ struct body_set {
 	double near;                  /* heights up to this count as on a plane, m */
 };
 
-/* O(n log n) in triangles, and O(corners) for each plane on the hull. 0, or -1 and e. */
+/* O(n log n) in triangles, and O(corners) for each plane on the hull and each solid. 0, or -1 and e. */
 int body_set_init(struct body_set *s, const struct model *m, struct err *e);
 void body_set_free(struct body_set *s);
 

@@ -14,6 +14,7 @@
 static const double near_fraction = 2e-7;
 
 struct merger {
+	const struct model *m;
 	struct polygons *p;
 	uint32_t *triangle;           /* [triangles][3] distinct points */
 	size_t triangles;
@@ -24,8 +25,9 @@ struct merger {
 	struct err *e;
 };
 
-static int weld(struct merger *g, const struct model *m)
+static int weld(struct merger *g)
 {
+	const struct model *m = g->m;
 	double lo[3], hi[3], centre[3], diagonal[3], tolerance;
 	uint32_t *group = mem_new(m->vertices, sizeof *group, "points", g->e);
 	uint32_t *id = mem_new(m->vertices, sizeof *id, "points", g->e);
@@ -81,9 +83,9 @@ static void join(struct merger *g, uint32_t edge)
 		sets_join(g->set, t, u);
 }
 
-static int put_polygon(struct merger *g, const uint32_t *corner, uint32_t n)
+static int put_polygon(struct merger *g, const uint32_t *corner, uint32_t n, int two_sided)
 {
-	struct polygon q = { .first = (uint32_t)g->p->corner.n, .n = n };
+	struct polygon q = { .first = (uint32_t)g->p->corner.n, .n = n, .two_sided = two_sided };
 	double twice[3] = { 0 }, sum = 0;
 
 	for (uint32_t i = 1; i + 1 < n; i++) {
@@ -161,14 +163,25 @@ static int flat(const struct merger *g, const uint32_t *tri, size_t n)
 	return 1;
 }
 
+static int has_back(const struct merger *g, uint32_t triangle)
+{
+	const struct model *m = g->m;
+
+	return !m->material.one_sided[m->surface.material[m->triangle_surface[triangle]]];
+}
+
 static int put_set(struct merger *g, const uint32_t *tri, size_t n)
 {
 	uint32_t corner[FLAT_CORNERS], count = n > 1 && flat(g, tri, n) ? outline(g, tri, n, corner) : 0;
 
-	if (count)
-		return put_polygon(g, corner, count);
+	int two_sided = 0;
+
 	for (size_t i = 0; i < n; i++)
-		if (put_polygon(g, &g->triangle[3 * (size_t)tri[i]], 3))
+		two_sided |= has_back(g, tri[i]);
+	if (count)
+		return put_polygon(g, corner, count, two_sided);
+	for (size_t i = 0; i < n; i++)
+		if (put_polygon(g, &g->triangle[3 * (size_t)tri[i]], 3, has_back(g, tri[i])))
 			return -1;
 	return 0;
 }
@@ -210,13 +223,13 @@ static int merge(struct merger *g)
 
 int polygons_init(struct polygons *p, const struct model *m, struct err *e)
 {
-	struct merger g = { .p = p, .triangles = m->triangles, .e = e };
+	struct merger g = { .m = m, .p = p, .triangles = m->triangles, .e = e };
 
 	*p = (struct polygons){ 0 };
 	g.triangle = mem_new(m->triangles, 3 * sizeof *g.triangle, "polygons", e);
 	g.order = mem_new(m->triangles, sizeof *g.order, "polygons", e);
 	g.set = sets_new(m->triangles, e);
-	int bad = !g.triangle || !g.order || !g.set || weld(&g, m) ||
+	int bad = !g.triangle || !g.order || !g.set || weld(&g) ||
 	          edges_build(&g.edges, g.triangle, g.triangles, p->points, e) ||
 	          !(g.next = mem_new(p->points, sizeof *g.next, "polygons", e)) || merge(&g);
 	free(g.triangle);

@@ -8,6 +8,7 @@
 struct polygon {
 	uint32_t first, n;            /* corners in polygons.corner, counter-clockwise */
 	struct plane plane;
+	int two_sided;                /* a back of it is modelled */
 };
 
 struct polygons {

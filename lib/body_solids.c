@@ -125,5 +125,7 @@ int solid_check(const struct polygons *p, struct solid *s)
 		if (lone(s, i) && fabs(plane_height(&s->missing, &p->point[3 * (size_t)s->side[i].low])) >
 		                  2 * p->near)
 			return 0;
-	return s->closed || (open >= 3 && all_behind(p, s, &s->missing));
+	/* The ends of a tube cancel in the sum. */
+	return s->closed || (open >= 3 && v3_dot(s->missing.normal, s->missing.normal) > 0 &&
+	                     all_behind(p, s, &s->missing));
 }

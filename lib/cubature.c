@@ -180,11 +180,11 @@ double cubature_exchange(const struct facet *a, const struct cubature *ca,
 	return sum / PI;
 }
 
-/* Relative errors measured on random facing pairs of triangles and rectangles are below
+/* Relative errors measured on triangles and rectangles seen by far smaller ones are below
  * factor (r / gap)^power; level 0 is for quadrilaterals only. */
 static const struct {
 	double factor, power;
-} level_error[CUBATURE_LEVELS] = { { 16, 4 }, { 8, 6 }, { 1, 8 }, { 1e-3, 12 } };
+} level_error[CUBATURE_LEVELS] = { { 16, 4 }, { 8, 6 }, { 2, 8 }, { .04, 12 } };
 
 void cubature_reach(double tolerance, double reach[CUBATURE_LEVELS])
 {

@@ -144,7 +144,8 @@ static double doubt(const struct integral *in, struct cell *c, const struct face
 	for (int k = 0; k < c->n; k++) {
 		double s = seen(&in->o->seer, c->v[k], in->f->normal, in->g, c->blockers, in->e);
 		double all = contour_point(c->v[k], in->f->normal, in->g->n, in->g->v);
-		off = fmax(off, dark ? s / all : 1 - s / all);
+		if (all > 0)
+			off = fmax(off, fmin(1, dark ? s / all : 1 - s / all));
 	}
 	return c->most * (unlikely + unproved * off);
 }

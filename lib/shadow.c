@@ -125,7 +125,7 @@ static void find_idle(struct cuts *c, const struct blocker *b, int number)
 		int of_g = side_of(&b->face[i], c->g->v, c->g->n, 3, c->near);
 		if (of_f && of_g == of_f && (b->flat || of_f > 0))
 			c->s->idle |= (uint64_t)1 << number;
-		else if (!of_f && !of_g && !b->flat)
+		else if (!of_f && (b->flat || !of_g))
 			add(c, &b->face[i], (uint64_t)1 << number);
 	}
 	for (int i = 0; i < b->edges && !(c->s->idle >> number & 1); i++)

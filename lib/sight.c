@@ -78,6 +78,16 @@ static int behind_facet(const struct body_set *s, const struct body *b, const st
 	return 1;
 }
 
+/* Is a facet in a solid, or a part of its faces, as a whole? */
+static int holds(const struct body_set *s, const struct body *b, const struct facet *f)
+{
+	for (uint32_t i = 0; i < b->faces && !b->flat; i++)
+		for (int c = 0; c < f->n; c++)
+			if (plane_height(&s->face[b->face + i], &f->v[3 * c]) > s->near)
+				return 0;
+	return !b->flat;
+}
+
 static int outside_shaft(const struct sight_line *l, const struct body *b)
 {
 	const double *x = &l->set->corner[3 * (size_t)b->corner];
@@ -157,7 +167,8 @@ static int collect(struct sight_line *l)
 			if (!l->planes)
 				l->planes = shaft_planes(l->a, l->b, s->near, l->shaft);
 			if (box_outside(l, b->lo, b->hi) || behind_facet(s, b, l->a) ||
-			    behind_facet(s, b, l->b) || outside_shaft(l, b))
+			    behind_facet(s, b, l->b) || (holds(s, b, l->a) && holds(s, b, l->b)) ||
+			    outside_shaft(l, b))
 				continue;
 			if (l->bodies == l->most)
 				return 0;

@@ -1,0 +1,414 @@
+/* Bodies, sights and partly hidden polygons: against hand-made scenes and brute force. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+#include "../../lib/body.h"
+#include "../../lib/exchange.h"
+#include "../../lib/facet_set.h"
+#include "../../lib/seen.h"
+#include "brute.h"
+#include "random_scene.h"
+
+static void assert_near(double got, double expected, double tolerance)
+{
+	if (!(fabs(got - expected) <= tolerance))
+		fail_msg("got %.17g, expected %.17g within %.2g", got, expected, tolerance);
+}
+
+struct lab {
+	struct model m;
+	struct facet_set s;
+	struct body_set bodies;
+	double centre[3];
+	struct exchanger x;
+};
+
+static void ready(struct lab *l, double absolute)
+{
+	struct err e = { 0 };
+	struct exchange_options o = { .relative = 1e-9, .absolute = absolute, .most = 20000 };
+
+	assert_int_equal(facet_set_init(&l->s, &l->m, FACETS_OF_PATCHES, &e), 0);
+	assert_int_equal(body_set_init(&l->bodies, &l->m, &e), 0);
+	facet_centre(&l->m, l->centre);
+	exchanger_init(&l->x, &o, &l->bodies, NULL, l->centre);
+}
+
+static void finish(struct lab *l)
+{
+	exchanger_free(&l->x);
+	facet_set_free(&l->s);
+	body_set_free(&l->bodies);
+	model_free(&l->m);
+}
+
+static size_t flats(const struct body_set *s)
+{
+	size_t n = 0;
+
+	for (size_t i = 0; i < s->bodies; i++)
+		n += s->body[i].flat != 0;
+	return n;
+}
+
+/* ---- bodies ---- */
+
+/* Two posts far away, so that nothing else is on the scene's hull: two flat bodies less
+ * than triangles on it. */
+static void far_room(struct model *m, int one_sided)
+{
+	scene_begin(m, one_sided);
+	scene_block(m, -10, -10, -10, 10, 10, 10, ALL_FACES, 1, 1);
+}
+
+/* Bodies of a scene of one block in a room: how many, and how many are flat. */
+static void check_block(int faces, int k, int one_sided, size_t bodies, size_t flat)
+{
+	struct lab l = { 0 };
+
+	far_room(&l.m, one_sided);
+	scene_block(&l.m, 0, 0, 0, 1, 2, 3, faces, k, 0);
+	assert_int_equal(scene_end(&l.m), 0);
+	ready(&l, 1e-6);
+	assert_int_equal(l.bodies.bodies, bodies);
+	assert_int_equal(flats(&l.bodies), flat);
+	if (bodies && !flat) {
+		assert_int_equal(l.bodies.body[0].corners, 8);
+		assert_int_equal(l.bodies.body[0].edges, 12);
+		assert_int_equal(l.bodies.body[0].faces, 6);
+	}
+	finish(&l);
+}
+
+static void test_block(void **state)
+{
+	(void)state;
+	for (int k = 1; k <= 4; k++) {
+		check_block(ALL_FACES, k, 1, 1, 0);
+		check_block(NO_BOTTOM, k, 1, 1, 0);
+		check_block(ALL_FACES, k, 0, 1, 0);   /* nothing sees into it */
+		check_block(NO_BOTTOM, k, 0, 5, 5);   /* its backs are seen from below */
+		check_block(51, k, 1, 4, 4);          /* two faces are missing */
+		check_block(1, k, 1, 1, 1);
+	}
+}
+
+static void test_room(void **state)
+{
+	(void)state;
+	for (int inwards = 0; inwards < 2; inwards++)
+		for (int one_sided = 0; one_sided < 2; one_sided++)
+			for (int faces = 1; faces < 64; faces = 2 * faces + 1) {
+				struct lab l = { 0 };
+				scene_begin(&l.m, one_sided);
+				scene_block(&l.m, 0, 0, 0, 1, 2, 3, faces, 3, inwards);
+				assert_int_equal(scene_end(&l.m), 0);
+				ready(&l, 1e-6);
+				assert_int_equal(l.bodies.bodies, 0);
+				finish(&l);
+			}
+}
+
+/* An L-shaped prism is not one solid, nor are two boxes that share a face. */
+static void test_not_convex(void **state)
+{
+	static const double outline[6][2] = { { 0, 0 }, { 2, 0 }, { 2, 1 }, { 1, 1 }, { 1, 2 }, { 0, 2 } };
+	struct lab l = { 0 };
+	double v[6][3];
+
+	(void)state;
+	far_room(&l.m, 1);
+	for (int i = 0; i < 6; i++) {
+		const double *a = outline[i], *b = outline[(i + 1) % 6];
+		scene_quad(&l.m, (double[]){ a[0], a[1], 0 }, (double[]){ b[0], b[1], 0 },
+		           (double[]){ b[0], b[1], 1 }, (double[]){ a[0], a[1], 1 });
+	}
+	/* As fans from the inner corner, which see it all. */
+	for (int i = 0; i < 6; i++) {
+		memcpy(v[i], (double[]){ outline[(i + 3) % 6][0], outline[(i + 3) % 6][1], 1 }, sizeof v[i]);
+	}
+	scene_polygon(&l.m, 6, (const double (*)[3])v);
+	assert_int_equal(scene_end(&l.m), 0);
+	ready(&l, 1e-6);
+	for (size_t i = 0; i < l.bodies.bodies; i++) {
+		const struct body *b = &l.bodies.body[i];
+		/* No body holds the notch. */
+		int holds = !b->flat;
+		for (uint32_t f = 0; holds && f < b->faces; f++) {
+			const struct plane *p = &l.bodies.face[b->face + f];
+			const double notch[3] = { 1.5 - l.centre[0], 1.5 - l.centre[1], .5 - l.centre[2] };
+			holds = v3_dot(p->normal, notch) < p->offset;
+		}
+		assert_false(holds);
+	}
+	finish(&l);
+}
+
+static void test_sharing(void **state)
+{
+	struct lab l = { 0 };
+
+	(void)state;
+	far_room(&l.m, 1);
+	scene_block(&l.m, 0, 0, 0, 1, 1, 1, ALL_FACES, 1, 0);
+	scene_block(&l.m, 1, 0, 0, 2, 1, 1, ALL_FACES, 1, 0);
+	assert_int_equal(scene_end(&l.m), 0);
+	ready(&l, 1e-6);
+	/* Whatever they are made of: nothing goes through either. */
+	uint32_t left = 12, right = 14;
+	struct sight_line s;
+	const struct facet *a = NULL, *b = NULL;
+	(void)left, (void)right;
+	for (size_t i = 0; i < l.s.facets; i++) {
+		const struct facet *f = &l.s.facet[i];
+		if (f->normal[0] > .9 && f->area > 100)
+			a = f;
+		if (f->normal[0] < -.9 && f->area > 100)
+			b = f;
+	}
+	assert_non_null(a);
+	assert_non_null(b);
+	assert_int_equal(sight_find(&s, &l.bodies, a, b), SIGHT_PART);
+	finish(&l);
+}
+
+/* A floor of unlike rectangles with T-junctions, away from the hull: it hides as one. */
+static void test_t_junctions(void **state)
+{
+	struct lab l = { 0 };
+	double off;
+	struct err e = { 0 };
+
+	(void)state;
+	far_room(&l.m, 1);
+	scene_grid(&l.m, (double[]){ -9, -9, 0 }, (double[]){ 9, 0, 0 }, (double[]){ 0, 18, 0 }, 1);
+	scene_grid(&l.m, (double[]){ 0, -9, 0 }, (double[]){ 9, 0, 0 }, (double[]){ 0, 18, 0 }, 3);
+	const double up = .5, down = -.5;
+	scene_quad(&l.m, (double[]){ -1, -1, down }, (double[]){ 1, -1, down }, (double[]){ 1, 1, down },
+	           (double[]){ -1, 1, down });
+	scene_quad(&l.m, (double[]){ -1, -1, up }, (double[]){ -1, 1, up }, (double[]){ 1, 1, up },
+	           (double[]){ 1, -1, up });
+	assert_int_equal(scene_end(&l.m), 0);
+	ready(&l, 1e-6);
+	uint32_t n = (uint32_t)l.s.facets;
+	assert_near(exchange(&l.x, &l.s, n - 1, &l.s, n - 2, &off, &e), 0, 4e-6);
+	finish(&l);
+}
+
+/* What is inside a two-sided box sees it, and the open side of an open one. */
+static void test_inside(void **state)
+{
+	struct err e = { 0 };
+
+	(void)state;
+	for (int faces = 31; faces < 64; faces += 32) {
+		struct lab l = { 0 };
+		double off, sum = 0;
+		far_room(&l.m, 0);
+		scene_block(&l.m, 0, 0, 0, 1, 1, 1, faces, 1, 0);
+		assert_int_equal(scene_end(&l.m), 0);
+		ready(&l, 1e-7);
+		/* The back of its first face: two faces before are the room's. */
+		uint32_t back = l.s.start[2 * 6 + 1];
+		for (uint32_t i = 0; i < l.s.facets; i++)
+			sum += i == back ? 0 : exchange(&l.x, &l.s, back, &l.s, i, &off, &e);
+		assert_near(sum, 1, 1e-5);
+		finish(&l);
+	}
+}
+
+/* A cone's front part has more edges than the cone. */
+static void test_cone(void **state)
+{
+	enum { SIDES = 31 };
+	struct lab l = { 0 };
+	struct err e = { 0 };
+	double off, x[SIDES + 1][3];
+
+	(void)state;
+	far_room(&l.m, 1);
+	for (int i = 0; i < SIDES; i++) {
+		x[i][0] = cos(2 * 3.14159265358979 * i / SIDES);
+		x[i][1] = sin(2 * 3.14159265358979 * i / SIDES);
+		x[i][2] = -10;
+	}
+	for (int i = 0; i < SIDES; i++) {
+		double v[3][3] = { { x[i][0], x[i][1], -10 }, { 0, 0, 0 }, { 0 } };
+		memcpy(v[1], x[(i + 1) % SIDES], sizeof v[1]);
+		v[2][0] = v[2][1] = v[2][2] = 0;
+		scene_polygon(&l.m, 3, (const double (*)[3])v);
+	}
+	/* Facets that look down from just below its top, at the floor. */
+	scene_quad(&l.m, (double[]){ -2, -2, -1 }, (double[]){ -2, 2, -1 }, (double[]){ 2, 2, -1 },
+	           (double[]){ 2, -2, -1 });
+	assert_int_equal(scene_end(&l.m), 0);
+	ready(&l, 1e-3);
+	double sum = 0;
+	uint32_t last = (uint32_t)l.s.facets - 1;
+	for (uint32_t i = 0; i < last; i++)
+		sum += exchange(&l.x, &l.s, last, &l.s, i, &off, &e);
+	assert_false(e.set);
+	assert_true(sum <= l.s.facet[last].area * (1 + .04));
+	finish(&l);
+}
+
+/* ---- sights ---- */
+
+static enum sight look(const double *(*blocker)(void), int solid, double at, double side)
+{
+	struct lab l = { 0 };
+	struct sight_line s;
+
+	(void)blocker;
+	far_room(&l.m, 1);
+	scene_quad(&l.m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 }, (double[]){ 1, 1, 0 },
+	           (double[]){ 0, 1, 0 });
+	scene_quad(&l.m, (double[]){ 0, 0, 2 }, (double[]){ 0, 1, 2 }, (double[]){ 1, 1, 2 },
+	           (double[]){ 1, 0, 2 });
+	if (solid)
+		scene_block(&l.m, at, -.5, .8, at + side, 1.5, 1.2, ALL_FACES, 1, 0);
+	else
+		scene_grid(&l.m, (double[]){ at, -.5, 1 }, (double[]){ side, 0, 0 }, (double[]){ 0, 2, 0 }, 1);
+	assert_int_equal(scene_end(&l.m), 0);
+	ready(&l, 1e-6);
+	enum sight found = sight_find(&s, &l.bodies, &l.s.facet[6], &l.s.facet[7]);
+	finish(&l);
+	return found;
+}
+
+static void test_sight(void **state)
+{
+	(void)state;
+	for (int solid = 0; solid < 2; solid++) {
+		assert_int_equal(look(NULL, solid, 1, 1), SIGHT_CLEAR);       /* touches the shaft */
+		assert_int_equal(look(NULL, solid, 2, 1), SIGHT_CLEAR);
+		assert_int_equal(look(NULL, solid, .9, 1), SIGHT_PART);
+		assert_int_equal(look(NULL, solid, .4, .01), SIGHT_PART);
+		assert_int_equal(look(NULL, solid, -.2, 1), SIGHT_PART);
+		assert_int_equal(look(NULL, solid, -.5, 2), SIGHT_NONE);
+		assert_int_equal(look(NULL, solid, -2, 6), SIGHT_NONE);
+	}
+}
+
+/* ---- against brute force ---- */
+
+static struct brute brute;
+
+/* A part of a facet in front of another. 0 if there is none. */
+static int in_front(const struct facet *f, const struct facet *of, double near,
+                    struct facet_room *room, struct facet *out)
+{
+	double low, high;
+
+	facet_heights(f, of->normal, of->offset, &low, &high);
+	*out = *f;
+	if (high <= near || low >= -near)
+		return high > near;
+	if (!facet_clip(f, of->normal, of->offset, room))
+		return 0;
+	*out = room->f;
+	return 1;
+}
+
+/* What points see, for all pairs of random scenes: sight_find, blocker_make and seen. */
+static void test_seen(void **state)
+{
+	(void)state;
+	for (uint64_t seed = 1; seed <= 24; seed++) {
+		struct lab l = { 0 };
+		struct dice d = { seed, 1000 };
+		struct err e = { 0 };
+		struct seer seer = { 0 };
+		assert_int_equal(random_scene(&l.m, seed), 0);
+		ready(&l, 1e-6);
+		seer.near = l.bodies.near;
+		for (int pair = 0; pair < 300; pair++) {
+			struct facet_room room[2];
+			struct facet f, g;
+			struct sight_line s;
+			const struct facet *a = &l.s.facet[roll_int(&d, 0, (int)l.s.facets - 1)];
+			const struct facet *b = &l.s.facet[roll_int(&d, 0, (int)l.s.facets - 1)];
+			if (a == b || !in_front(a, b, seer.near, &room[0], &f) ||
+			    !in_front(b, a, seer.near, &room[1], &g))
+				continue;
+			enum sight sight = sight_find(&s, &l.bodies, &f, &g);
+			int blockers = 0;
+			for (int i = 0; sight == SIGHT_PART && i < s.bodies; i++)
+				blockers += blocker_make(&l.bodies, s.body[i], &g, &seer.blocker[blockers]);
+			brute_begin(&brute, &l.m, l.centre, &f, &g, seer.near);
+			for (int k = 0; k < 4; k++) {
+				double x[3], u = sqrt(roll(&d, 0, 1)), w = roll(&d, 0, 1);
+				int c = roll_int(&d, 1, f.n - 2);
+				for (int i = 0; i < 3; i++)
+					x[i] = (1 - u) * f.v[i] + u * ((1 - w) * f.v[3 * c + i] + w * f.v[3 * c + 3 + i]);
+				double exact = brute_point(&brute, x), got = 0;
+				if (sight != SIGHT_NONE)
+					got = seen(&seer, x, f.normal, &g, blockers ? UINT64_MAX >> (64 - blockers) : 0, &e);
+				if (!(fabs(got - exact) <= 2e-6))
+					fail_msg("seed %d, facets %d and %d: %.12g, brute %.12g (sight %d)", (int)seed,
+					         (int)(a - l.s.facet), (int)(b - l.s.facet), got, exact, (int)sight);
+			}
+		}
+		seer_free(&seer);
+		finish(&l);
+	}
+}
+
+/* Boxes and plates between two quadrilaterals. */
+static void test_exchange(void **state)
+{
+	struct err e = { 0 };
+	struct dice d = { 23, 0 };
+
+	(void)state;
+	for (int k = 0; k < 12; k++) {
+		struct lab l = { 0 };
+		double off, at[3];
+		far_room(&l.m, k & 1);
+		scene_quad(&l.m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 }, (double[]){ 1.2, 1, 0 },
+		           (double[]){ 0, 1, 0 });
+		scene_quad(&l.m, (double[]){ 0, 0, 2 }, (double[]){ 0, 1, 1.8 }, (double[]){ 1, 1, 1.8 },
+		           (double[]){ 1, 0, 2 });
+		for (int i = 0; i < 1 + k % 3; i++) {
+			for (int c = 0; c < 3; c++)
+				at[c] = roll(&d, .2, .8) + (c == 2 ? .4 : 0);
+			if ((k + i) & 1)
+				random_box(&l.m, &d, at, .5, 0, ALL_FACES);
+			else
+				random_plate(&l.m, &d, at, .7);
+		}
+		assert_int_equal(scene_end(&l.m), 0);
+		ready(&l, 1e-6);
+		uint32_t a = l.s.start[2 * 6], b = l.s.start[2 * 7];
+		double got = exchange(&l.x, &l.s, a, &l.s, b, &off, &e);
+		brute_begin(&brute, &l.m, l.centre, &l.s.facet[a], &l.s.facet[b], l.bodies.near);
+		assert_near(got, brute_exchange(&brute, 1e-4, 3), 4e-6);
+		assert_true(off <= 1.2e-6);
+		double back = exchange(&l.x, &l.s, b, &l.s, a, &off, &e);
+		assert_near(back, got, 4e-6);
+		finish(&l);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_block),
+		cmocka_unit_test(test_room),
+		cmocka_unit_test(test_not_convex),
+		cmocka_unit_test(test_sharing),
+		cmocka_unit_test(test_t_junctions),
+		cmocka_unit_test(test_inside),
+		cmocka_unit_test(test_cone),
+		cmocka_unit_test(test_sight),
+		cmocka_unit_test(test_seen),
+		cmocka_unit_test(test_exchange),
+	};
+	return cmocka_run_group_tests_name("blockers", tests, NULL, NULL);
+}

@@ -1,0 +1,412 @@
+/* Facets, their form factors by contour and by cubature: against closed forms. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "../../lib/clear.h"
+#include "../../lib/contour.h"
+#include "polygon_scene.h"
+
+static const double pi = 3.14159265358979323846;
+
+static void assert_near(double got, double expected, double tolerance)
+{
+	if (!(fabs(got - expected) <= tolerance))
+		fail_msg("got %.17g, expected %.17g within %.2g", got, expected, tolerance);
+}
+
+static struct facet facet_of(int n, const double *v)
+{
+	struct facet f = { .n = n, .v = v };
+
+	facet_measure(&f);
+	return f;
+}
+
+static double fraction(int n, const double *a, int k, const double *b)
+{
+	struct facet f = facet_of(n, a), g = facet_of(k, b);
+
+	return contour_exchange(&f, &g) / f.area;
+}
+
+/* ---- points ---- */
+
+static void test_point(void **state)
+{
+	/* tests/data/form_factors.json: pt_rect_perp, pt_tri, pt_tri_close. */
+	const double up[3] = { 0, 0, 1 }, third = .33333333333333333;
+	const double wall[] = { 0, 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1 };
+	const double tri[] = { 0, 0, 1, 0, 1, 1.5, 1, 0, .7 };
+	const double near[] = { 0, 0, 1e-6, 0, 1, 1e-6, 1, 0, 1e-6 };
+
+	(void)state;
+	assert_near(contour_point((double[]){ 1, 0, 0 }, up, 4, wall), .05573419700255350161, 1e-16);
+	assert_near(contour_point((double[]){ .1, .2, 0 }, up, 3, tri), .11295688744816556648, 1e-16);
+	assert_near(contour_point((double[]){ third, third, 0 }, up, 3, near),
+	            .99999999999156228199, 1e-14);
+}
+
+/* A point under the corner of a rectangle of sides a, b at height c: Howell B-3. */
+static void test_point_small_and_far(void **state)
+{
+	const double up[3] = { 0, 0, 1 }, x[3] = { 0, 0, 0 };
+
+	(void)state;
+	for (double c = 1e-3; c < 2e3; c *= 10) {
+		const double v[] = { 0, 0, c, 0, 1, c, 1, 1, c, 1, 0, c };
+		double p = 1 / hypot(1, c), exact = p * atan(p) / pi;
+		/* The terms of far polygons cancel: absolute to rounding. */
+		assert_near(contour_point(x, up, 4, v), exact, 2e-16);
+	}
+}
+
+/* ---- exchange ---- */
+
+static void test_parallel(void **state)
+{
+	const double a[] = { 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0 };
+	const double b[] = { 0, 0, 1, 0, 1, 1, 1, 1, 1, 1, 0, 1 };
+	const double c[] = { .5, .25, .75, .5, 2, .75, 1.5, 2, .75, 1.5, .25, .75 };
+
+	(void)state;
+	assert_near(fraction(4, a, 4, b), .19982489569838738304, 1e-15);
+	assert_near(fraction(4, a, 4, c), .23835551517202025989, 1e-15);
+}
+
+/* Perpendicular rectangles [x] x [y] at z = 0 and [y] x [z] at x = 0: Howell C-15. */
+static double perpendicular(const double x[2], const double y[2], const double eta[2],
+                            const double z[2])
+{
+	double sum = 0;
+
+	for (int n = 0; n < 16; n++) {
+		double a = x[n & 1], d = y[n >> 1 & 1] - eta[n >> 2 & 1], c = z[n >> 3];
+		double h2 = a * a + c * c, h = sqrt(h2), r2 = h2 + d * d;
+		double g = (h > 0 ? d * h * atan(d / h) : 0) - (r2 > 0 ? .25 * (h2 - d * d) * log(r2) : 0);
+		sum += __builtin_parity((unsigned)n) ? -g : g;
+	}
+	return sum / (2 * pi);
+}
+
+static double perpendicular_contour(const double x[2], const double y[2], const double eta[2],
+                                    const double z[2])
+{
+	const double a[] = { x[0], y[0], 0, x[1], y[0], 0, x[1], y[1], 0, x[0], y[1], 0 };
+	const double b[] = { 0, eta[0], z[0], 0, eta[1], z[0], 0, eta[1], z[1], 0, eta[0], z[1] };
+	struct facet f = facet_of(4, a), g = facet_of(4, b);
+
+	return contour_exchange(&f, &g);
+}
+
+/* Edges in line: the same, partly overlapping, touching at a corner, apart; and thin. */
+static void test_perpendicular(void **state)
+{
+	const double from = 0, x[][2] = { { 0, 1 }, { 0, .1 }, { 0, 1e-3 }, { .5, 1.5 }, { 1e-7, 1 } };
+	const double y[][2] = { { 0, 1 }, { .25, 2 }, { -1, .5 }, { .2, .3 }, { 1, 2 }, { 1.5, 4 } };
+
+	(void)state;
+	assert_near(perpendicular_contour(x[3], y[0], y[1], (double[]){ .5, 1 }),
+	            .052268665576064740168, 1e-15);
+	assert_near(perpendicular_contour(x[1], y[0], y[0], (double[]){ 0, 2 }),
+	            .1 * .43755517392044433537, 1e-15);
+	for (int i = 0; i < 5; i++)
+		for (int j = 0; j < 6; j++)
+			for (double top = 1e-3; top < 20; top *= 10) {
+				const double z[2] = { from, top };
+				double exact = perpendicular(x[i], y[0], y[j], z);
+				assert_near(perpendicular_contour(x[i], y[0], y[j], z), exact,
+				            2e-14 * (1 + top) * (1 + top));
+			}
+}
+
+/* tests/data/form_factors.json. */
+static void test_triangles(void **state)
+{
+	const double right[] = { 0, 0, 0, 1, 0, 0, 0, 1, 0 }, high[] = { 0, 0, 0, 1, 0, 0, .5, 1, 0 };
+	const double corner[] = { 0, 0, 0, 0, 0, 1, 1, 0, 0 };
+	const double vertex[] = { 0, 0, 0, -.5, .5, 1, .5, .5, 1 };
+	const double at10[] = { 0, 0, 0, .5, .98480775301220805937, .17364817766693034885, 1, 0, 0 };
+	const double at179[] = { 0, 0, 0, .5, -.99984769515639123916, .017452406437283512819, 1, 0, 0 };
+	const double needle[2][9] = { { 0, 0, 0, .001, 0, 0, 0, 1, 0 }, { 0, 0, 0, 0, 1, 0, 0, 0, .001 } };
+
+	(void)state;
+	assert_near(fraction(3, right, 3, corner), .21132486540518711775, 1e-14);
+	assert_near(fraction(3, right, 3, vertex), .11675155427561136122, 1e-14);
+	assert_near(fraction(3, high, 3, at10), .84713792811846125666, 1e-14);
+	assert_near(fraction(3, high, 3, at179), .000026142785292725882869, 1e-14);
+	assert_near(fraction(3, needle[0], 3, needle[1]), .29278293134766831249, 1e-11);
+}
+
+/* Turned by a little about the common axis, squares change by its square. */
+static void test_nearly_parallel(void **state)
+{
+	const double a[] = { 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0 };
+	double before = .19982489569838738304;
+
+	(void)state;
+	for (double angle = 1e-6; angle > 5e-17; angle /= 10) {
+		double b[12];
+		for (int i = 0; i < 4; i++) {
+			double x = i > 1 ? .5 : -.5, y = i == 1 || i == 2 ? .5 : -.5;
+			b[3 * i] = .5 + x - angle * y;
+			b[3 * i + 1] = .5 + y + angle * x;
+			b[3 * i + 2] = 1;
+		}
+		assert_near(fraction(4, a, 4, b), before, angle * angle + 2e-14);
+	}
+}
+
+/* The same bits both ways, and whatever corner comes first to rounding. */
+static void test_both_ways(void **state)
+{
+	struct dice d = { 7, 0 };
+
+	(void)state;
+	for (int k = 0; k < 50; k++) {
+		double a[9], b[9], turned[9];
+		for (int i = 0; i < 9; i++) {
+			a[i] = roll(&d, 0, 1) * (i % 3 != 2);
+			b[i] = roll(&d, 0, 1) + (i % 3 == 2);
+		}
+		struct facet f = facet_of(3, a), g = facet_of(3, b);
+		for (int i = 0; i < 9; i++)
+			turned[i] = b[(i + 3) % 9];
+		struct facet h = facet_of(3, turned);
+		if (f.normal[2] < 0 || v3_dot(g.normal, f.v) - g.offset < 0 ||
+		    v3_dot(g.normal, &f.v[3]) - g.offset < 0 || v3_dot(g.normal, &f.v[6]) - g.offset < 0)
+			continue;
+		double one = contour_exchange(&f, &g);
+		assert_near(contour_exchange(&g, &f), one, 1e-14);
+		assert_near(contour_exchange(&f, &h), one, 1e-14);
+	}
+}
+
+/* ---- cubature ---- */
+
+static void random_facet(struct dice *d, int quad, double size, const double at[3], double v[12])
+{
+	double frame[3][3], u = size * roll(d, .3, 1), w = size * roll(d, .3, 1), skew = roll(d, -.5, .5);
+
+	roll_frame(d, 0, frame);
+	for (int k = 0; k < 3; k++) {
+		double x = u * frame[0][k], y = w * (frame[1][k] + (quad ? 0 : skew * frame[0][k]));
+		v[k] = at[k];
+		v[3 + k] = at[k] + x;
+		v[(quad ? 9 : 6) + k] = at[k] + y;
+		if (quad)
+			v[6 + k] = at[k] + x + y;
+	}
+}
+
+static int in_front(const struct facet *f, const struct facet *g)
+{
+	double low, high;
+
+	facet_heights(g, f->normal, f->offset, &low, &high);
+	return low > 0;
+}
+
+static double spread_over(const struct facet *f, const struct cubature *c, const struct facet *g)
+{
+	double sum = 0;
+
+	for (int i = 0; i < c->n; i++) {
+		double x[3] = { c->x[i], c->y[i], c->z[i] };
+		sum += c->w[i] > 0 ? c->w[i] * contour_point(x, f->normal, g->n, g->v) : 0;
+	}
+	return sum;
+}
+
+/* A facet at each level, seen by a far smaller one as near as that level may be used. */
+static void test_cubature_reach(void **state)
+{
+	static const double tolerance[] = { 1e-4, 1e-6 };
+	struct dice d = { 3, 0 };
+	double reach[CUBATURE_LEVELS], x[2][4][36];
+
+	(void)state;
+	for (int t = 0; t < 2; t++)
+		for (int pair = 0; pair < 20000; pair++) {
+			double v[12], w[12], at[3], frame[3][3];
+			int l = pair % CUBATURE_LEVELS, quad = l == 0 || pair / 4 % 2;
+			struct cubature p = { 0, x[0][0], x[0][1], x[0][2], x[0][3] };
+			struct cubature q = { 0, x[1][0], x[1][1], x[1][2], x[1][3] };
+			cubature_reach(tolerance[t], reach);
+			random_facet(&d, quad, 1, (double[]){ 0, 0, 0 }, v);
+			struct facet f = facet_of(quad ? 4 : 3, v);
+			roll_frame(&d, 0, frame);
+			v3_mad(f.centre, (reach[l] + .02) * f.radius, frame[2], at);
+			random_facet(&d, 1, .01 * f.radius, at, w);
+			struct facet g = facet_of(4, w);
+			if (!in_front(&f, &g) || !in_front(&g, &f))
+				continue;
+			cubature_fill(&f, l, &p);
+			cubature_fill(&g, 3, &q);
+			double exact = spread_over(&g, &q, &f), got = cubature_exchange(&f, &p, &g, &q);
+			assert_near(got, exact, tolerance[t] * exact + 1e-15 * g.area);
+			assert_near(cubature_exchange(&g, &q, &f, &p), got, 1e-14 * got);
+		}
+}
+
+static void test_cubature_weights(void **state)
+{
+	struct dice d = { 5, 0 };
+	double x[4][CUBATURE_LEVELS * 36 * 7];
+
+	(void)state;
+	for (int n = 3; n <= FACET_CORNERS; n++) {
+		double v[FACET_CORNERS * 3], a = roll(&d, .3, 1), b = roll(&d, .3, 1);
+		for (int i = 0; i < n; i++) {
+			v[3 * i] = a * cos(2 * pi * i / n);
+			v[3 * i + 1] = b * sin(2 * pi * i / n);
+			v[3 * i + 2] = .5 * v[3 * i];
+		}
+		struct facet f = facet_of(n, v);
+		for (int l = 0; l < CUBATURE_LEVELS; l++) {
+			struct cubature c = { 0, x[0], x[1], x[2], x[3] };
+			double sum = 0;
+			cubature_fill(&f, l, &c);
+			assert_int_equal(c.n, cubature_points(n, l));
+			assert_int_equal(c.n % 4, 0);
+			for (int i = 0; i < c.n; i++) {
+				sum += c.w[i];
+				double at[3] = { c.x[i], c.y[i], c.z[i] };
+				assert_near(v3_dot(f.normal, at), f.offset, 1e-15);
+			}
+			assert_near(sum, f.area, 1e-14);
+		}
+	}
+}
+
+/* What is chosen for a pair, far, near, unequal or touching: within what was asked for. */
+static void test_clear(void **state)
+{
+	static const double relative[] = { 4e-7, 1e-9 };
+	struct dice d = { 11, 0 };
+	static struct clear c;
+
+	(void)state;
+	for (int t = 0; t < 2; t++) {
+		clear_init(&c, relative[t]);
+		for (int pair = 0; pair < 3000; pair++) {
+			double v[12], w[12], at[3], size = exp(roll(&d, -6, 0)), gap = exp(roll(&d, -4, 2));
+			for (int k = 0; k < 3; k++)
+				at[k] = gap * roll(&d, -1, 1);
+			int quad = roll_int(&d, 0, 1);
+			random_facet(&d, quad, 1, (double[]){ 0, 0, 0 }, v);
+			random_facet(&d, 1, size, at, w);
+			struct facet f = facet_of(3 + quad, v), g = facet_of(4, w);
+			if (!in_front(&f, &g) || !in_front(&g, &f))
+				continue;
+			double got = clear_exchange(&c, &f, NULL, &g, NULL), exact = contour_exchange(&f, &g);
+			assert_near(got, exact, relative[t] * exact +
+			            2e-14 * (f.radius + g.radius) * (f.radius + g.radius));
+		}
+	}
+}
+
+/* ---- facets ---- */
+
+static void assert_plane(const struct facet *part, const struct facet *whole)
+{
+	for (int i = 0; i < part->n; i++)
+		assert_near(v3_dot(whole->normal, &part->v[3 * i]), whole->offset, 1e-15);
+	for (int k = 0; k < 3; k++)
+		assert_true(part->normal[k] == whole->normal[k]);
+	assert_true(part->offset == whole->offset);
+}
+
+static void test_facet_parts(void **state)
+{
+	struct dice d = { 13, 0 };
+
+	(void)state;
+	for (int k = 0; k < 2000; k++) {
+		int n = roll_int(&d, 3, FACET_CORNERS - 2);
+		double v[FACET_CORNERS * 3], frame[3][3], plane[3][3], a = roll(&d, .01, 1);
+		roll_frame(&d, 0, frame);
+		for (int i = 0; i < n; i++)
+			for (int c = 0; c < 3; c++)
+				v[3 * i + c] = a * cos(2 * pi * i / n) * frame[0][c] + sin(2 * pi * i / n) * frame[1][c];
+		struct facet f = facet_of(n, v);
+		struct facet_room part[4];
+		roll_frame(&d, 0, plane);
+		double offset = v3_dot(plane[2], f.centre) + roll(&d, -.1, .1) * a;
+		if (facet_split(&f, plane[2], offset, part)) {
+			assert_near(part[0].f.area + part[1].f.area, f.area, 1e-14);
+			assert_plane(&part[0].f, &f);
+			assert_plane(&part[1].f, &f);
+		}
+		assert_true(facet_halve(&f, part));
+		assert_near(part[0].f.area + part[1].f.area, f.area, 1e-14);
+		if (!facet_quarter(&f, part))
+			continue;
+		double sum = 0;
+		for (int i = 0; i < 4; i++) {
+			sum += part[i].f.area;
+			assert_plane(&part[i].f, &f);
+		}
+		assert_near(sum, f.area, 1e-14);
+	}
+}
+
+static void test_facet_clip(void **state)
+{
+	const double v[] = { 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0 }, x[3] = { 1, 0, 0 };
+	struct facet f = facet_of(4, v);
+	struct facet_room out;
+
+	(void)state;
+	assert_true(facet_clip(&f, x, .25, &out));
+	assert_near(out.f.area, .75, 1e-16);
+	assert_int_equal(out.f.n, 4);
+	assert_true(facet_clip(&f, x, 0, &out));
+	assert_true(out.f.area == 1);
+	assert_false(facet_clip(&f, x, 1, &out));
+	assert_false(facet_clip(&f, x, 2, &out));
+	assert_true(facet_clip(&f, x, .5, &out));
+	assert_true(facet_clip(&out.f, (double[]){ 0, 1, 0 }, .5, &out));
+	assert_near(out.f.area, .25, 1e-16);
+}
+
+static void test_edge_divide(void **state)
+{
+	struct dice d = { 17, 0 };
+
+	(void)state;
+	for (int i = 0; i < 1000; i++) {
+		double a[3], b[3], p[3], q[3], ha = roll(&d, 1e-9, 1), hb = -roll(&d, 1e-9, 1);
+		for (int k = 0; k < 3; k++) {
+			a[k] = roll(&d, -1, 1);
+			b[k] = roll(&d, -1, 1);
+		}
+		edge_divide(a, ha, b, hb, p);
+		edge_divide(b, hb, a, ha, q);
+		assert_memory_equal(p, q, sizeof p);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_point),
+		cmocka_unit_test(test_point_small_and_far),
+		cmocka_unit_test(test_parallel),
+		cmocka_unit_test(test_perpendicular),
+		cmocka_unit_test(test_triangles),
+		cmocka_unit_test(test_nearly_parallel),
+		cmocka_unit_test(test_both_ways),
+		cmocka_unit_test(test_cubature_reach),
+		cmocka_unit_test(test_cubature_weights),
+		cmocka_unit_test(test_clear),
+		cmocka_unit_test(test_facet_parts),
+		cmocka_unit_test(test_facet_clip),
+		cmocka_unit_test(test_edge_divide),
+	};
+	return cmocka_run_group_tests_name("polygon", tests, NULL, NULL);
+}
