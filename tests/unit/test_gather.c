@@ -220,6 +220,35 @@ static void open_scene(void **state)
 	model_free(&m);
 }
 
+/* Elements that touch the emitter cast rays; however many the rows have, they must not
+ * be of some directions only. Squares at a right angle: F = .200044 (Howell, C-14). */
+static void close_by(void **state)
+{
+	struct model m;
+	struct ff f;
+	struct ff_stats stats;
+	struct ff_options o = options(256);
+	double got = 0;
+
+	(void)state;
+	o.rays = 65536;
+	begin(&m, 2, 1);
+	add_rectangle(&m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 }, (double[]){ 0, 1, 0 }, 0);
+	add_rectangle(&m, (double[]){ 0, 0, 0 }, (double[]){ 0, 1, 0 }, (double[]){ 0, 0, 1 }, 1);
+	m.material.emission[0] = 1;
+	run(&m, sizes(2, .12, 0));
+	memory_ff(&m, &o, &f, &stats);
+	check_closure(&f);
+	double *h = lit_by(&m, &f, 0);
+	for (size_t i = 0; i < 2 * m.elements; i++)
+		got += h[i] * m.element_area[i / 2];
+	print_message("F %.6f\n", got);
+	assert_true(fabs(got - .200044) < 2e-4);
+	free(h);
+	ff_free(&f);
+	model_free(&m);
+}
+
 static void any_threads(void **state)
 {
 	struct model m;
@@ -250,6 +279,7 @@ int main(void)
 		cmocka_unit_test(seen),
 		cmocka_unit_test(hidden),
 		cmocka_unit_test(open_scene),
+		cmocka_unit_test(close_by),
 		cmocka_unit_test(any_threads),
 	};
 
