@@ -34,7 +34,7 @@ from chain import TOP, Failed, picture, run, table
 SCENES = {"cornell": ("classic", "256x256"), "two-pass": ("overview", "320x240")}
 SMOOTH = ["--samples", 16, "--lobe-samples", 4]
 METHODS = {  # options of ffcalc, from fast to fine
-    "hemicube": ["-n 32 -p 4", "-n 32 -p 16", "-n 64 -p 16", "-n 64 -p 64"],
+    "hemicube": ["-n 16 -p 4", "-n 32 -p 4", "-n 32 -p 16", "-n 64 -p 16"],
     "rays": ["-n 256", "-n 1024", "-n 4096", "-n 16384"],
     "analytic": ["-n 256 -t 1e-2", "-n 1024 -t 1e-3", "-n 4096 -t 1e-4", "-n 16384 -t 1e-5"],
     "auto": ["-n 256 -t 1e-3", "-n 1024 -t 1e-3", "-n 4096 -t 1e-4", "-n 16384 -t 1e-5"]}
