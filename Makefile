@@ -120,9 +120,13 @@ oracles: all
 bench: all $(BENCHES)
 	BUILD=$(abspath $(BUILD)) sh tests/bench/run.sh
 
-# The README's table of speed against error.
+# The README's table and plot of speed against error; the yardsticks are kept.
 report-table: all
-	BUILD=$(abspath $(BUILD)) $(PYTHON) tests/bench/report.py
+	BUILD=$(abspath $(BUILD)) $(PYTHON) tests/bench/report.py --work $(BUILD)/report --plot $(BUILD)/report
+
+# The README's table of form factors between patches.
+bench-form-factors: all $(BUILD)/bench/rays
+	BUILD=$(abspath $(BUILD)) $(PYTHON) tests/bench/form_factors.py --tuned
 
 format:
 	clang-format -i lib/*.[ch] formats/*.[ch] formats/*.cc tools/*.c tools/common/*.[ch] tests/unit/*.[ch]
@@ -144,6 +148,7 @@ install: all
 clean:
 	rm -rf build build-san out
 
-.PHONY: all unit deps demo check check-layers check-man oracles bench report-table format install clean
+.PHONY: all unit deps demo check check-layers check-man oracles bench report-table bench-form-factors \
+	format install clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

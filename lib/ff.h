@@ -51,12 +51,13 @@ struct ff {
 	uint32_t *row_side;       /* patch-side the flux leaves */
 	uint8_t *row_kind;
 	uint32_t *row_samples;    /* rays or hemicube pixels spent on block 0, or as
-	                             many independent rays as gathered values are worth */
+	                             many independent rays as gathered values are worth;
+	                             0: all by formula */
 	double *row_scale;
 	double *row_residual;     /* 1 - sum before scaling (raw closure error) */
-	double *row_error;        /* error of the row, in the norm "root of the summed squares
-	                             over receiving patch-sides": the standard error of
-	                             sampled methods, an estimate like a bound of analytic ones */
+	double *row_error;        /* over receiving patch-sides: the root of the summed squares of
+	                             standard errors; of a row all by formula the sum of the
+	                             estimated errors */
 	uint64_t *row_block;      /* [rows+1] first block */
 
 	size_t blocks;

@@ -91,13 +91,15 @@ static int by_direction(const void *a, const void *b)
 	return (p > q) - (p < q);
 }
 
-/* The first n sample points, each aligned block of a power of two that divides `each` in
- * an order in which neighbours have similar directions (their places on a Morton curve,
- * which scrambling keeps): rays and memory then see coherent work. */
+/* The first n sample points, each aligned block of a power of two that divides `each`, but
+ * none longer than the fewest points that are used at a time, in an order in which
+ * neighbours have similar directions (their places on a Morton curve, which scrambling
+ * keeps): rays and memory then see coherent work. */
 static int fill_samples(struct ff_samples *s, uint32_t each, uint64_t n, struct err *e)
 {
 	uint32_t block = each & (~each + 1);
 
+	block = block < FF_CLOSE_RAYS ? block : FF_CLOSE_RAYS;
 	s->n = n < SOBOL_POINTS_MAX ? (uint32_t)n : SOBOL_POINTS_MAX;
 	s->bits = mem_new((size_t)s->n * FF_DIMS, sizeof *s->bits, "sample points", e);
 	struct sample *sample = mem_new(s->n, sizeof *sample, "sample points", e);
@@ -119,7 +121,7 @@ static int make_samples(struct ff_job *j, struct err *e)
 {
 	uint32_t each = j->o.rays / FF_REPLICATES, gather = j->o.gather;
 
-	if (j->o.method != FF_RAYS)
+	if (j->o.method == FF_HEMICUBE)
 		return 0;
 	return fill_samples(&j->of_rows, each, (uint64_t)each * j->o.emitter_gain, e) ||
 	       fill_samples(&j->of_gathering, gather, gather, e) ? -1 : 0;

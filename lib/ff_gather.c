@@ -96,6 +96,11 @@ static void gather_patches(void *arg, size_t begin, size_t end, int thread)
 	}
 }
 
+static int is_by_formula(const struct ff_job *j, uint32_t ps)
+{
+	return ff_formula_has(&j->formula, ps) && (j->formula.all || j->emits[ps]);
+}
+
 static int takes(const struct ff_job *j, double patch_area, double element_area)
 {
 	return patch_area >= larger * element_area &&
@@ -206,13 +211,22 @@ static int any_takes(const struct ff_job *j)
 	return takes(j, most, least);
 }
 
+/* Rows by formula are made of sights too, whatever their sizes. */
+static int any_by_formula(const struct ff_job *j)
+{
+	for (uint32_t ps = 0; ps < 2 * j->m->patches; ps++)
+		if (is_by_formula(j, ps))
+			return 1;
+	return 0;
+}
+
 int ff_gather(struct ff_job *j, double *rays, const struct progress *progress, struct err *e)
 {
 	size_t threads = j->o.threads > 0 ? (size_t)j->o.threads : 1;
 	struct gatherer g = { .job = j, .to = &j->gather };
 	int bad;
 
-	if (!any_takes(j))
+	if (!any_takes(j) && !any_by_formula(j))
 		return 0;
 	bad = allocate(&g, threads, e);
 
@@ -253,10 +267,9 @@ static int element_takes(const struct ff_job *j, uint32_t ps, uint32_t column)
 
 int ff_row_is_seen(const struct ff_job *j, uint32_t ps)
 {
-	if (ff_formula_has(&j->formula, ps) && (j->formula.all || j->emits[ps]))
-		return 1;
-	return j->emits[ps] &&
-	       j->m->elements <= LOOKS_A_RAY * (uint64_t)j->o.rays * j->o.emitter_gain;
+	return is_by_formula(j, ps) ||
+	       (j->emits[ps] &&
+	        j->m->elements <= LOOKS_A_RAY * (uint64_t)j->o.rays * j->o.emitter_gain);
 }
 
 int ff_row_is_gathered(const struct ff_job *j, uint32_t ps)

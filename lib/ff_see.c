@@ -7,7 +7,7 @@
 
 #define PI 3.14159265358979323846
 
-enum { MOST_PAIRS = 1024, CLOSE_RAYS = 2048, PILOT_PAIRS = 64 };
+enum { MOST_PAIRS = 1024, PILOT_PAIRS = 64 };
 
 /* Of a close element's rays, if so many may meet the source they are better than pairs of
  * points, whose weights vary as one over the square of their distance. */
@@ -110,16 +110,16 @@ static struct ff_sight by_rays(struct ff_thread *t, uint32_t source, uint32_t co
 
 	for (int d = 0; d < FF_DIMS; d++)
 		seeds[d] = rng_sobol_seed(seed, d);
-	for (uint32_t first = 0; first < CLOSE_RAYS; first += RAY_BATCH) {
+	for (uint32_t first = 0; first < FF_CLOSE_RAYS; first += RAY_BATCH) {
 		ff_batch_from_element(j, &j->of_rows, seeds, column, first, RAY_BATCH, &b);
 		for (int i = 0; i < RAY_BATCH; i++)
 			hits += b.ray.triangle[i] != RAY_MISS && b.ray.side[i] == (source & 1) &&
 			        j->m->element_patch[b.hit[i]] == source >> 1;
 	}
-	t->rays += CLOSE_RAYS;
-	double f = (double)hits / CLOSE_RAYS;
+	t->rays += FF_CLOSE_RAYS;
+	double f = (double)hits / FF_CLOSE_RAYS;
 	double scale = j->m->element_area[column >> 1] / j->m->patch_area[source >> 1];
-	return (struct ff_sight){ column, scale * f, scale * scale * f * (1 - f) / CLOSE_RAYS };
+	return (struct ff_sight){ column, scale * f, scale * scale * f * (1 - f) / FF_CLOSE_RAYS };
 }
 
 /* A pair of points, moved off their surfaces, and its weight. */

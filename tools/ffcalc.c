@@ -15,6 +15,7 @@
 
 enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GAIN, OPT_GATHER,
        OPT_TO, OPT_CLOSE };
+enum { GATHER_LEAST = 16 };
 
 static const struct cli_option options[] = {
 	{ 'o', "output", "FILE", "write the form factors to FILE (.ff)" },
@@ -104,10 +105,12 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 	o->rays = n ? (uint32_t)n : hemicube ? 64 : 4096;
 	if (hemicube && (o->rays % 2 || o->rays > 8192))
 		cli_usage(c, "--samples %u: a hemicube's resolution is even and at most 8192", o->rays);
-	if (!hemicube)
+	if (!hemicube) {
+		uint32_t least = o->method == FF_RAYS ? 0 : GATHER_LEAST;
 		o->rays = (o->rays + 3) / 4 * 4;
-	if (!hemicube)
-		o->gather = gather >= 0 ? (uint32_t)gather : o->rays >= 256 ? o->rays / 16 : 0;
+		o->gather = gather >= 0 ? (uint32_t)gather
+		          : o->rays / 16 >= GATHER_LEAST ? o->rays / 16 : least;
+	}
 	if (o->target == 0)
 		o->target = o->to_patches ? 1e-6 : 1e-4;
 	o->threads = c->threads;
@@ -182,8 +185,9 @@ static void print_report(const struct ff_stats *s, const struct request *r, doub
 		        "%.0f sampled\n", s->pairs[0], s->pairs[1], s->pairs[2],
 		        s->evaluations / fmax(1, s->pairs[2]), s->pairs[3]);
 	fprintf(out, "row sums      within %.3g of 1 before scaling\n", s->worst_residual);
-	fprintf(out, "row error     %.3g mean, %.3g worst (standard error, root of squares over receivers)\n",
-	       s->mean_error, s->worst_error);
+	fprintf(out, "row error     %.3g mean, %.3g worst (%s)\n", s->mean_error, s->worst_error,
+	        s->samples > 0 ? "standard error, root of squares over receivers"
+	                       : "estimates, summed over receivers");
 	if (s->cut > 0)
 		fprintf(out, "cut           at most %.3g of a row, by --depth %u\n", s->cut, r->ff.depth);
 	fprintf(out, "seconds       %.3f\n", seconds);

@@ -16,7 +16,7 @@ listed() {
 		sed -n -E 's/^ {2,8}(-[A-Za-z])?,? *(--[a-z][a-z-]*)( [^ ].*)?$/\1 \2 \3/p' |
 		awk '{ letter = $1 ~ /^--/ ? "none" : $1; name = letter == "none" ? $1 : $2
 		       takes = NF > (letter == "none" ? 1 : 2)
-		       print letter, name, takes + 0 }' | sort
+		       print letter, name, takes + 0 }' | sort -u
 }
 
 for page in $pages; do

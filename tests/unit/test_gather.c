@@ -220,6 +220,54 @@ static void open_scene(void **state)
 	model_free(&m);
 }
 
+/* What the second of two squares at a right angle gets of the first, an emitter:
+ * .200044 (Howell, C-14). */
+static double at_a_right_angle(const struct ff_options *o, double element_size)
+{
+	struct model m;
+	struct ff f;
+	struct ff_stats stats;
+	double got = 0;
+
+	begin(&m, 2, 1);
+	add_rectangle(&m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 }, (double[]){ 0, 1, 0 }, 0);
+	add_rectangle(&m, (double[]){ 0, 0, 0 }, (double[]){ 0, 1, 0 }, (double[]){ 0, 0, 1 }, 1);
+	m.material.emission[0] = 1;
+	run(&m, sizes(2, element_size, 0));
+	memory_ff(&m, o, &f, &stats);
+	check_closure(&f);
+	double *h = lit_by(&m, &f, 0);
+	for (size_t i = 0; i < 2 * m.elements; i++)
+		got += h[i] * m.element_area[i / 2];
+	print_message("F %.6f\n", got);
+	free(h);
+	ff_free(&f);
+	model_free(&m);
+	return got;
+}
+
+/* Elements that touch the emitter cast rays; however many the rows have, they must not
+ * be of some directions only. */
+static void close_by(void **state)
+{
+	struct ff_options o = options(256);
+
+	(void)state;
+	o.rays = 65536;
+	assert_true(fabs(at_a_right_angle(&o, .12) - .200044) < 2e-4);
+}
+
+/* By formula, also where elements are as large as the patch. */
+static void by_formula(void **state)
+{
+	struct ff_options o = options(16);
+
+	(void)state;
+	o.method = FF_AUTO;
+	o.target = 1e-4;
+	assert_true(fabs(at_a_right_angle(&o, 2) - .200044) < 1e-6);
+}
+
 static void any_threads(void **state)
 {
 	struct model m;
@@ -250,6 +298,8 @@ int main(void)
 		cmocka_unit_test(seen),
 		cmocka_unit_test(hidden),
 		cmocka_unit_test(open_scene),
+		cmocka_unit_test(close_by),
+		cmocka_unit_test(by_formula),
 		cmocka_unit_test(any_threads),
 	};
 
