@@ -116,7 +116,8 @@ int solid_check(const struct polygons *p, struct solid *s)
 	size_t open = missing_plane(p, s, &s->missing);
 
 	s->closed = open == 0;
-	if (s->polygons < 3 || s->polygons + 1 > BODY_FACES || s->sides > 2 * BODY_EDGES)
+	if (s->polygons < 3 || s->polygons + 1 > BODY_FACES ||
+	    s->sides + open > 2 * BODY_EDGES)
 		return 0;
 	for (size_t i = 0; i < s->polygons; i++)
 		if (!all_behind(p, s, &poly[s->polygon[i]].plane))

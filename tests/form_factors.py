@@ -10,7 +10,8 @@ form_factors.py --tap     the same judged, with reciprocity and invariance, as T
 
 What counts as agreement (every value, no exceptions):
   analytic   1e-9 absolute and 1e-8 relative where nothing is between, else 1e-6
-             absolute; reciprocity and invariance 1e-9 relative
+             absolute; reciprocity 1e-9 relative; invariance the same where nothing is
+             between, else twice the target, 2e-7 absolute
   others     q times the stated error or, if that is more, the weight of one sample; q the
              two-sided 99 % point for all values of the run (Bonferroni) of Student's t with 3
              degrees of freedom: the stated error is the spread of four estimates
@@ -36,7 +37,9 @@ from contour import REAL, area, visible_form_factor
 from polygon2gltf import Placement, polygon, write
 import random_polygons
 
-OPTIONS = {"analytic": ["--to", "patches", "-t", "1e-7"],
+TARGET = 1e-7
+
+OPTIONS = {"analytic": ["--to", "patches", "-t", str(TARGET)],
            "rays": ["-n", "65536"],
            "hemicube": ["-n", "64", "-p", "256"]}
 
@@ -218,7 +221,8 @@ def checks_of(case, method, options, folder):
         if sampled:
             yield check_value(name + movement, case, r, sampled)
             continue
-        yield Check(name + movement, r.f[0] / r.exact - base.f[0] / base.exact, SAME,
+        allowed = 2 * TARGET / r.exact if case.occluders else SAME
+        yield Check(name + movement, r.f[0] / r.exact - base.f[0] / base.exact, allowed,
                     note=f"F12 {base.f[0]:.17g} became {r.f[0]:.17g}")
 
 

@@ -48,7 +48,7 @@ static double brute(const struct model *m, struct brute *b, const struct body_se
 	if (!front(f, g, bodies->near, &room[0], &a) || !front(g, f, bodies->near, &room[1], &c))
 		return 0;
 	brute_begin(b, m, centre, &a, &c, bodies->near);
-	return brute_exchange(b, 3e-5 * fmin(f->area, g->area), 3);
+	return brute_exchange(b, 1e-4 * fmin(f->area, g->area), 3);
 }
 
 static struct brute b;
@@ -83,13 +83,13 @@ static void scene(uint64_t seed, int every, double tolerance)
 			double a = exchange(&x, &s, i, &s, j, &off, &e);
 			double t2 = seconds() - t;
 			main_time += t2;
-			if (t2 > .25)
+			if (t2 > 1)
 				printf("seed %lu pair %u %u: %.2f s\n", (unsigned long)seed, i, j, t2);
 			if (x.counts.crowded > crowd) {
 				printf("seed %lu pair %u %u: crowded\n", (unsigned long)seed, i, j);
 				continue;
 			}
-			int suspect = !isfinite(a) || a < 0 || a > least * (1 + 1e-9);
+			int suspect = !isfinite(a) || !isfinite(off) || a < -1e-18 || a > least * (1 + 1e-9);
 			double fine = a;
 			if (x.counts.partly > before) {
 				t = seconds();
