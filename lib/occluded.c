@@ -248,7 +248,6 @@ static double integrate(struct integral *in, double tolerance, int most, double 
 static void make_blockers(struct occluded *o, const struct sight_line *l, const struct facet *g)
 {
 	o->blockers = 0;
-	memset(o->seer.apart, 0xff, sizeof o->seer.apart);
 	for (int i = 0; i < l->bodies; i++)
 		o->blockers += blocker_make(l->set, l->body[i], g, &o->seer.blocker[o->blockers]);
 }

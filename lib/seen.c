@@ -131,7 +131,7 @@ static int silhouette(const struct blocker *b, const double x[3], double near,
 static int still_apart(const struct seer *o, int blocker, const double x[3])
 {
 	const struct blocker *b = &o->blocker[blocker];
-	int edge = o->apart[blocker];
+	int edge = b->apart;
 	double plane[3], h[PIECE_CORNERS];
 
 	if (edge < 0 || (!b->flat && in_front(b, b->edge[edge].left, x, o->near) ==
@@ -179,7 +179,7 @@ static int hide(struct seer *o, int blocker, const double x[3], struct err *e)
 			cut_piece(p, x, plane[k], away);
 			o->next.n += away->n >= 3;
 			if (!p->n)
-				o->apart[blocker] = edge[k];
+				o->blocker[blocker].apart = edge[k];
 		}
 		hid |= p->n >= 3;
 	}

@@ -8,7 +8,6 @@
 /* One thread's scratch space and the blockers; begin with {0}, release with seer_free. */
 struct seer {
 	struct blocker blocker[SIGHT_BLOCKERS];
-	int apart[SIGHT_BLOCKERS];    /* an edge that had the last view on its far side, or -1 */
 	double near;                  /* of the body set */
 	struct vec piece, next;       /* what is still visible, convex */
 	int hid;                      /* set when a blocker hides something */

@@ -289,6 +289,7 @@ int blocker_make(const struct body_set *s, uint32_t body, const struct facet *f,
 	struct cut cut = { { 0 }, { { { 0 } } } };
 
 	out->edges = 0;
+	out->apart = -1;
 	out->faces = (int)b->faces;
 	out->flat = b->flat;
 	memcpy(out->face, &s->face[b->face], b->faces * sizeof *out->face);

@@ -24,6 +24,7 @@ struct blocker {
 	} edge[BLOCKER_EDGES];
 	struct plane face[BODY_FACES];
 	double centre[3];
+	int apart;                /* an edge that had the last view on its far side, or -1 */
 };
 
 struct sight_line {

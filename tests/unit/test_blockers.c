@@ -32,7 +32,8 @@ struct lab {
 static void ready(struct lab *l, double absolute)
 {
 	struct err e = { 0 };
-	struct exchange_options o = { .relative = 1e-9, .absolute = absolute, .most = 20000 };
+	struct exchange_options o = { .relative = 1e-9, .absolute = absolute, .most = 20000, .bodies = SIGHT_BLOCKERS,
+	                              .crowd_rays = 0 };
 
 	assert_int_equal(facet_set_init(&l->s, &l->m, FACETS_OF_PATCHES, &e), 0);
 	assert_int_equal(body_set_init(&l->bodies, &l->m, &e), 0);
@@ -162,7 +163,7 @@ static void test_sharing(void **state)
 	ready(&l, 1e-6);
 	/* Whatever they are made of: nothing goes through either. */
 	uint32_t left = 12, right = 14;
-	struct sight_line s;
+	struct sight_line s = { .most = SIGHT_BLOCKERS };
 	const struct facet *a = NULL, *b = NULL;
 	(void)left, (void)right;
 	for (size_t i = 0; i < l.s.facets; i++) {
@@ -269,7 +270,7 @@ static void test_cone(void **state)
 static enum sight look(const double *(*blocker)(void), int solid, double at, double side)
 {
 	struct lab l = { 0 };
-	struct sight_line s;
+	struct sight_line s = { .most = SIGHT_BLOCKERS };
 
 	(void)blocker;
 	far_room(&l.m, 1);
@@ -337,7 +338,7 @@ static void test_seen(void **state)
 		for (int pair = 0; pair < 300; pair++) {
 			struct facet_room room[2];
 			struct facet f, g;
-			struct sight_line s;
+			struct sight_line s = { .most = SIGHT_BLOCKERS };
 			const struct facet *a = &l.s.facet[roll_int(&d, 0, (int)l.s.facets - 1)];
 			const struct facet *b = &l.s.facet[roll_int(&d, 0, (int)l.s.facets - 1)];
 			if (a == b || !in_front(a, b, seer.near, &room[0], &f) ||
