@@ -20,20 +20,11 @@ struct shadows {
 /* Planes that cut facet f where what its points see of facet g past the blockers changes
  * its law: through an edge of one and a corner of the other that have all of each on one
  * side (edges of the whole shadow and of its core), through parallel edges of both or of
- * two blockers, where a gap between them opens, or through a blocker's face that g crosses. No more are kept than fit.
+ * two blockers, where a gap between them opens, or through a blocker's face that g
+ * crosses. No more are kept than fit.
  * O((blockers x edges)^2). */
 void shadow_edges(const struct blocker *b, int blockers, const struct facet *f,
                   const struct facet *g, double near, struct shadows *s);
-
-/* 1 if a blocker hides all of f from all of g: the shadow of a convex body from a point is
- * convex, so corners speak for facets. */
-int blocker_hides(const struct blocker *b, const struct facet *f, const struct facet *g,
-                  double near);
-
-/* 1 if it is sure that the blockers of the set bits together hide all of f from all of g:
- * for each of the parts that g is halved into, `depth` times at most, one does. */
-int blockers_hide(const struct blocker *b, uint64_t from, const struct facet *f,
-                  const struct facet *g, double near, int depth);
 
 /* What blockers do to the view from a convex cell in the plane of f to g: those of the set
  * bits of `from` that may hide something stay set; 0: nothing does. *hidden is set if one

@@ -178,64 +178,16 @@ static int collect(struct sight_line *l)
 	return 1;
 }
 
-/* ---- does one body hide everything? ---- */
-
-static int inside_polygon(const struct body_set *s, const struct body *b, const double x[3])
+/* Does one of the bodies hide everything? */
+static int one_hides(const struct sight_line *l)
 {
-	const struct plane *p = &s->face[b->face];
+	struct blocker b;
 
-	for (uint32_t i = 0; i < b->edges; i++) {
-		const struct body_edge *e = &s->edge[b->edge + i];
-		double u[3], v[3], c[3];
-		v3_sub(&s->corner[3 * (size_t)e->b], &s->corner[3 * (size_t)e->a], u);
-		v3_sub(x, &s->corner[3 * (size_t)e->a], v);
-		v3_cross(u, v, c);
-		if (v3_dot(c, p->normal) < 0)
-			return 0;
-	}
-	return 1;
-}
-
-static int cuts_flat(const struct body_set *s, const struct body *b, const double p[3],
-                     const double q[3])
-{
-	const struct plane *plane = &s->face[b->face];
-	double hp = plane_height(plane, p), hq = plane_height(plane, q), x[3];
-
-	if (!((hp > s->near && hq < -s->near) || (hp < -s->near && hq > s->near)))
-		return 0;
-	for (int k = 0; k < 3; k++)
-		x[k] = p[k] + hp / (hp - hq) * (q[k] - p[k]);
-	return inside_polygon(s, b, x);
-}
-
-static int cuts_solid(const struct body_set *s, const struct body *b, const double p[3],
-                      const double q[3])
-{
-	double from = 0, to = 1;
-
-	for (uint32_t i = 0; i < b->faces; i++) {
-		double hp = plane_height(&s->face[b->face + i], p);
-		double hq = plane_height(&s->face[b->face + i], q);
-		if (hp > 0 && hq > 0)
-			return 0;
-		if (hp > 0)
-			from = fmax(from, hp / (hp - hq));
-		else if (hq > 0)
-			to = fmin(to, hp / (hp - hq));
-	}
-	return from <= to;
-}
-
-/* The shadow of a convex body from a point is convex, so corners speak for facets. */
-static int hides(const struct body_set *s, const struct body *b, const struct facet *f,
-                 const struct facet *g)
-{
-	for (int i = 0; i < f->n; i++)
-		for (int j = 0; j < g->n; j++)
-			if (!(b->flat ? cuts_flat : cuts_solid)(s, b, &f->v[3 * i], &g->v[3 * j]))
-				return 0;
-	return 1;
+	for (int i = 0; i < l->bodies; i++)
+		if (blocker_make(l->set, l->body[i], l->b, &b) &&
+		    blocker_hides(&b, l->a, l->b, l->set->near))
+			return 1;
+	return 0;
 }
 
 enum sight sight_find(struct sight_line *l, const struct body_set *set, const struct facet *a,
@@ -254,76 +206,7 @@ enum sight sight_find(struct sight_line *l, const struct body_set *set, const st
 	grow_box(l, a);
 	grow_box(l, b);
 	int all = collect(l);
-	for (int i = 0; i < l->bodies; i++)
-		if (hides(set, &set->body[l->body[i]], a, b))
-			return SIGHT_NONE;
+	if (one_hides(l))
+		return SIGHT_NONE;
 	return !all ? SIGHT_CROWDED : l->bodies ? SIGHT_PART : SIGHT_CLEAR;
-}
-
-/* ---- blockers ---- */
-
-static void put_edge(struct blocker *o, const double a[3], const double b[3], int left, int right)
-{
-	memcpy(o->edge[o->edges].a, a, 3 * sizeof *a);
-	memcpy(o->edge[o->edges].b, b, 3 * sizeof *b);
-	o->edge[o->edges].left = left;
-	o->edge[o->edges++].right = right;
-}
-
-/* Where the plane that cuts a body crosses each of its faces. */
-struct cut {
-	int points[BODY_FACES];
-	double point[BODY_FACES][2][3];
-};
-
-static void note_cut(struct cut *c, int face, const double x[3])
-{
-	if (c->points[face] < 2)
-		memcpy(c->point[face][c->points[face]++], x, 3 * sizeof *x);
-}
-
-int blocker_make(const struct body_set *s, uint32_t body, const struct facet *f,
-                 struct blocker *out)
-{
-	const struct body *b = &s->body[body];
-	struct cut cut = { { 0 }, { { { 0 } } } };
-
-	out->edges = 0;
-	out->apart = -1;
-	out->faces = (int)b->faces;
-	out->flat = b->flat;
-	memcpy(out->face, &s->face[b->face], b->faces * sizeof *out->face);
-	memcpy(out->centre, b->centre, sizeof out->centre);
-	for (uint32_t i = 0; i < b->edges; i++) {
-		const struct body_edge *e = &s->edge[b->edge + i];
-		const double *p = &s->corner[3 * (size_t)e->a], *q = &s->corner[3 * (size_t)e->b];
-		double hp = v3_dot(f->normal, p) - f->offset, hq = v3_dot(f->normal, q) - f->offset;
-		double x[3];
-		int p_in = hp >= -s->near, q_in = hq >= -s->near;
-		if (p_in && q_in) {
-			put_edge(out, p, q, e->left, e->right);
-			continue;
-		}
-		if (!p_in && !q_in)
-			continue;
-		if (p_in ? hp > s->near : hq > s->near) {
-			edge_divide(p, hp, q, hq, x);
-			put_edge(out, p_in ? p : x, p_in ? x : q, e->left, e->right);
-		} else {
-			memcpy(x, p_in ? p : q, sizeof x);
-		}
-		note_cut(&cut, e->left, x);
-		if (!b->flat)
-			note_cut(&cut, e->right, x);
-	}
-	for (int i = 0; i < out->faces && out->edges; i++)
-		if (cut.points[i] == 2)
-			put_edge(out, cut.point[i][0], cut.point[i][1], i, b->flat ? i : out->faces);
-	for (int k = 0; k < 3 && out->edges; k++) {
-		double sum = 0;
-		for (int i = 0; i < out->edges; i++)
-			sum += out->edge[i].a[k] + out->edge[i].b[k];
-		out->centre[k] = sum / (2 * out->edges);
-	}
-	return out->edges >= 3;
 }

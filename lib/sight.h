@@ -2,29 +2,15 @@
 #ifndef TWOPASS_SIGHT_H
 #define TWOPASS_SIGHT_H
 
-#include "body.h"
-#include "facet.h"
+#include "blocker.h"
 
-enum { SIGHT_BLOCKERS = 48, SHAFT_PLANES = 2 * FACET_CORNERS,
-       BLOCKER_EDGES = BODY_EDGES + BODY_FACES };
+enum { SIGHT_BLOCKERS = 48, SHAFT_PLANES = 2 * FACET_CORNERS };
 
 enum sight {
 	SIGHT_CLEAR,          /* nothing: every point of one sees every point of the other */
 	SIGHT_NONE,           /* one body hides all of one from all of the other */
 	SIGHT_PART,           /* the blockers listed may hide something */
 	SIGHT_CROWDED         /* more blockers than the list holds */
-};
-
-/* A body, or what of it is in front of a facet. */
-struct blocker {
-	int edges, faces, flat;
-	struct {
-		double a[3], b[3];
-		int left, right;      /* faces; `faces` = the cut, which no eye is in front of */
-	} edge[BLOCKER_EDGES];
-	struct plane face[BODY_FACES];
-	double centre[3];
-	int apart;                /* an edge that had the last view on its far side, or -1 */
 };
 
 struct sight_line {
@@ -37,8 +23,8 @@ struct sight_line {
 	int bodies, most;         /* most: how many are let in before it is a crowd */
 };
 
-/* Looks from a to b, which lie in front of one another; l->most is set. With SIGHT_PART the bodies that
- * may hide something are in l->body. O(log bodies + bodies between x corners). */
+/* Looks from a to b, which lie in front of one another; l->most is set. With SIGHT_PART the
+ * bodies that may hide something are in l->body. O(log bodies + bodies between x corners). */
 enum sight sight_find(struct sight_line *l, const struct body_set *set, const struct facet *a,
                       const struct facet *b);
 
@@ -46,9 +32,5 @@ enum sight sight_find(struct sight_line *l, const struct body_set *set, const st
  * the other. Returns their number. */
 int shaft_planes(const struct facet *f, const struct facet *g, double near,
                  struct plane shaft[SHAFT_PLANES]);
-
-/* The part of a body in front of the plane of facet b into `out`. 0 if nothing is. */
-int blocker_make(const struct body_set *s, uint32_t body, const struct facet *b,
-                 struct blocker *out);
 
 #endif

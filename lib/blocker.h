@@ -1,0 +1,36 @@
+/* What stands between two facets, one body at a time. */
+#ifndef TWOPASS_BLOCKER_H
+#define TWOPASS_BLOCKER_H
+
+#include "body.h"
+#include "facet.h"
+
+enum { BLOCKER_EDGES = BODY_EDGES + BODY_FACES };
+
+/* A body, or what of it is in front of a facet. */
+struct blocker {
+	int edges, faces, flat;
+	struct {
+		double a[3], b[3];
+		int left, right;      /* faces; `faces` = the cut, which no eye is in front of */
+	} edge[BLOCKER_EDGES];
+	struct plane face[BODY_FACES];
+	double centre[3];
+	int apart;                /* an edge that had the last view on its far side, or -1 */
+};
+
+/* The part of a body in front of the plane of facet b into `out`. 0 if nothing is. */
+int blocker_make(const struct body_set *s, uint32_t body, const struct facet *b,
+                 struct blocker *out);
+
+/* 1 if a blocker hides all of f from all of g: the shadow of a convex body from a point is
+ * convex, so corners speak for facets. */
+int blocker_hides(const struct blocker *b, const struct facet *f, const struct facet *g,
+                  double near);
+
+/* 1 if it is sure that the blockers of the set bits together hide all of f from all of g:
+ * for each of the parts that g is halved into, `depth` times at most, one does. */
+int blockers_hide(const struct blocker *b, uint64_t from, const struct facet *f,
+                  const struct facet *g, double near, int depth);
+
+#endif
