@@ -1,8 +1,64 @@
-/* Batches of rows: chain numbers and links made those of the whole. */
+/* Batches of rows: put together, chain numbers and links made those of the whole. */
 #include <stdlib.h>
 #include <string.h>
 
 #include "ff_tally.h"
+
+int batch_begin(struct ff_batch *b, struct err *e)
+{
+	const uint64_t zero = 0;
+
+	/* Start arrays hold ends while a batch grows and a leading 0. */
+	if (b->row_block.n)
+		return 0;
+	return vec_append(&b->row_block, &zero, 1, sizeof zero, e) ||
+	       vec_append(&b->block_start, &zero, 1, sizeof zero, e) ||
+	       vec_append(&b->block_arrival, &zero, 1, sizeof zero, e) ? -1 : 0;
+}
+
+int batch_reserve(struct ff_batch *b, size_t n, struct err *e)
+{
+	return vec_reserve(&b->column, n, sizeof(uint32_t), e) ||
+	       vec_reserve(&b->value, n, b->f64 ? sizeof(double) : sizeof(float), e) ? -1 : 0;
+}
+
+double batch_put_value(struct ff_batch *b, uint32_t column, double w)
+{
+	((uint32_t *)b->column.data)[b->column.n++] = column;
+	if (b->f64)
+		return ((double *)b->value.data)[b->value.n++] = w;
+	return (double)(((float *)b->value.data)[b->value.n++] = (float)w);
+}
+
+int batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *r,
+                    struct err *e)
+{
+	uint64_t entries = b->column.n, arrivals = b->arrival_target.n;
+
+	return vec_append(&b->block_chain, &chain, 1, sizeof chain, e) ||
+	       vec_append(&b->block_start, &entries, 1, sizeof entries, e) ||
+	       vec_append(&b->block_arrival, &arrivals, 1, sizeof arrivals, e) ||
+	       vec_append(&b->escape, &r->escape, 1, sizeof r->escape, e) ||
+	       vec_append(&b->black, &r->black, 1, sizeof r->black, e) ||
+	       vec_append(&b->lost, &r->lost, 1, sizeof r->lost, e) ||
+	       vec_append(&b->cut, &r->cut, 1, sizeof r->cut, e) ? -1 : 0;
+}
+
+int batch_put_row(struct ff_batch *b, const struct batch_row *r, struct err *e)
+{
+	uint64_t blocks = b->block_chain.n;
+	uint8_t kind = (uint8_t)r->kind;
+
+	return vec_append(&b->row_side, &r->side, 1, sizeof r->side, e) ||
+	       vec_append(&b->row_kind, &kind, 1, sizeof kind, e) ||
+	       vec_append(&b->row_samples, &r->samples, 1, sizeof r->samples, e) ||
+	       vec_append(&b->row_scale, &r->scale, 1, sizeof r->scale, e) ||
+	       vec_append(&b->row_residual, &r->residual, 1, sizeof r->residual, e) ||
+	       vec_append(&b->row_error, &r->error, 1, sizeof r->error, e) ||
+	       vec_append(&b->row_block, &blocks, 1, sizeof blocks, e) ? -1 : 0;
+}
+
+/* ---- the numbers of the whole ---- */
 
 static int map_chain(uint32_t *chain, const struct chains *local, struct vec *map,
                      struct chains *whole, struct err *e)

@@ -6,7 +6,6 @@
 
 #include "exchange.h"
 #include "ff_close.h"
-#include "ff_exact.h"
 #include "lobe.h"
 #include "vec3.h"
 
@@ -32,7 +31,8 @@ struct matrix {
 	size_t first, rows;
 	float *e32;                   /* [rows][n] exchange areas, one of them */
 	double *e64;
-	struct exact_row *row;        /* [rows] */
+	struct batch_row *row;        /* [rows] */
+	struct tally_rest *rest;      /* [rows] what of them no side receives */
 	uint8_t *closed;              /* [rows] what leaves the side arrives on sides */
 	struct vec doubt;             /* struct doubt, by pair */
 };
@@ -152,7 +152,7 @@ static void rest(const struct matrix *m, uint32_t ps, uint32_t *escapes, uint32_
  * others, what nothing received. */
 static void judge(struct matrix *m, size_t r)
 {
-	struct exact_row *row = &m->row[r];
+	struct batch_row *row = &m->row[r];
 	double area = m->area[m->first + r], sum = 0;
 	uint32_t escapes = 0, blacks = 0;
 
@@ -166,8 +166,8 @@ static void judge(struct matrix *m, size_t r)
 	m->closed[r] = !(escapes + blacks) && row->residual <= CERTAIN * row->error;
 	if (m->closed[r])
 		return;
-	row->black = escapes + blacks ? row->residual * blacks / (escapes + blacks) : 0;
-	row->escape = row->residual - row->black;
+	double black = escapes + blacks ? row->residual * blacks / (escapes + blacks) : 0;
+	m->rest[r] = (struct tally_rest){ .escape = row->residual - black, .black = black };
 	row->residual = 0;
 }
 
@@ -183,6 +183,7 @@ static void judge_all(struct matrix *m)
 	const struct doubt *d = m->doubt.data;
 
 	memset(m->row, 0, m->rows * sizeof *m->row);
+	memset(m->rest, 0, m->rows * sizeof *m->rest);
 	for (size_t k = 0; k < m->doubt.n; k++) {
 		size_t i = d[k].i - m->first, j = d[k].j - m->first; /* beyond rows if outside */
 		if (i < m->rows)
@@ -217,11 +218,10 @@ static int close_rows(struct matrix *m, struct err *e)
 
 static int put_row(struct ff_batch *b, const struct matrix *m, size_t r, struct err *e)
 {
-	struct exact_row *row = &m->row[r];
-	double area = m->area[m->first + r], sum = row->escape + row->black;
+	struct batch_row *row = &m->row[r];
+	double area = m->area[m->first + r], sum = m->rest[r].escape + m->rest[r].black;
 
-	if (vec_reserve(&b->column, m->n, sizeof(uint32_t), e) ||
-	    vec_reserve(&b->value, m->n, b->f64 ? sizeof(double) : sizeof(float), e))
+	if (batch_begin(b, e) || batch_reserve(b, m->n, e))
 		return -1;
 	for (size_t j = 0; j < m->n; j++) {
 		double x = get(m, r, j);
@@ -229,7 +229,7 @@ static int put_row(struct ff_batch *b, const struct matrix *m, size_t r, struct 
 			sum += batch_put_value(b, m->side[j], x / area);
 	}
 	row->scale = sum > 0 ? 1 / sum : 0;
-	return batch_put_exact(b, row, e);
+	return batch_put_block(b, 0, &m->rest[r], e) || batch_put_row(b, row, e) ? -1 : 0;
 }
 
 static int emit(struct matrix *m, const struct ff_sink *sink, struct ff_stats *stats,
@@ -263,11 +263,12 @@ static int bands(struct matrix *m, size_t begin, size_t end, const struct ff_sin
 	most = most < 1 ? 1 : most < end - begin ? most : end - begin;
 	void *room = mem_new(most * m->n, size, "exchange areas", e);
 	m->row = mem_new(most, sizeof *m->row, "exchange areas", e);
+	m->rest = mem_new(most, sizeof *m->rest, "exchange areas", e);
 	m->closed = mem_new(most, 1, "exchange areas", e);
 	if (m->job->o.close && most < m->n)
 		err_set(e, "--close needs all rows at once: no --part, and at most about %zu "
 		        "patch-sides", (size_t)sqrt(BAND_BYTES / (double)size));
-	if (!room || !m->row || !m->closed || e->set) {
+	if (!room || !m->row || !m->rest || !m->closed || e->set) {
 		free(room);
 		return -1;
 	}
@@ -348,6 +349,7 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
 	free(m.side);
 	free(m.area);
 	free(m.row);
+	free(m.rest);
 	free(m.closed);
 	free(m.doubt.data);
 	facet_set_free(&m.facets);

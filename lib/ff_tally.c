@@ -291,22 +291,6 @@ void tally_replicate(struct tally *t)
 
 /* ---- finishing a row ---- */
 
-/* Room for n more entries. */
-static int reserve(struct ff_batch *b, size_t n, struct err *e)
-{
-	return vec_reserve(&b->column, n, sizeof(uint32_t), e) ||
-	       vec_reserve(&b->value, n, b->f64 ? sizeof(double) : sizeof(float), e) ? -1 : 0;
-}
-
-/* Appends an entry into reserved room; returns its value as it is stored. */
-static double put_value(struct ff_batch *b, uint32_t column, double w)
-{
-	((uint32_t *)b->column.data)[b->column.n++] = column;
-	if (b->f64)
-		return ((double *)b->value.data)[b->value.n++] = w;
-	return (double)(((float *)b->value.data)[b->value.n++] = (float)w);
-}
-
 /* Variance of one receiver's share of the row from its replicates, or, where
  * there are none, of as many independent samples. */
 static double share_variance(const struct tally *t, double sum, double square, double total,
@@ -345,14 +329,14 @@ static int finish_side(struct tally *t, struct ff_batch *b, uint32_t ps, uint32_
 	uint32_t end = tally_side_end(t, ps);
 	double part[TALLY_REPLICATES] = { 0 }, side_sum = 0, square = t->square[ps];
 
-	if (reserve(b, end - place, e))
+	if (batch_reserve(b, end - place, e))
 		return -1;
 	for (; place < end; place = tally_next(t, (uint64_t)place + 1)) {
 		double w = t->dense[place] + tally_counted(t, place);
 		for (int r = 0; r < TALLY_REPLICATES; r++)
 			part[r] += t->count[place][r];
 		if (w > 0)
-			f->sum += put_value(b, t->places->column[place], w);
+			f->sum += batch_put_value(b, t->places->column[place], w);
 		side_sum += w;
 		t->dense[place] = 0;
 		memset(t->count[place], 0, sizeof t->count[place]);
@@ -423,19 +407,9 @@ static int put_arrivals(struct tally *t, struct ff_batch *b, uint32_t slot, stru
 static int put_block(struct tally *t, struct ff_batch *b, uint32_t slot, struct err *e)
 {
 	const struct tally_rest *r = (const struct tally_rest *)t->rest.data + slot;
-	uint64_t entries = b->column.n, arrivals;
-	uint32_t chain = ((const uint32_t *)t->slot_chain.data)[slot];
 
-	if (put_arrivals(t, b, slot, e))
-		return -1;
-	arrivals = b->arrival_target.n;
-	return vec_append(&b->block_chain, &chain, 1, sizeof chain, e) ||
-	       vec_append(&b->block_start, &entries, 1, sizeof entries, e) ||
-	       vec_append(&b->block_arrival, &arrivals, 1, sizeof arrivals, e) ||
-	       vec_append(&b->escape, &r->escape, 1, sizeof r->escape, e) ||
-	       vec_append(&b->black, &r->black, 1, sizeof r->black, e) ||
-	       vec_append(&b->lost, &r->lost, 1, sizeof r->lost, e) ||
-	       vec_append(&b->cut, &r->cut, 1, sizeof r->cut, e) ? -1 : 0;
+	return put_arrivals(t, b, slot, e) ||
+	       batch_put_block(b, ((const uint32_t *)t->slot_chain.data)[slot], r, e) ? -1 : 0;
 }
 
 int chains_compare(const struct chains *c, uint32_t a, uint32_t b)
@@ -488,8 +462,8 @@ static int finish_far(struct tally *t, struct ff_batch *b, struct err *e)
 				hi = mid;
 		}
 		for (; !bad && i < t->far.n && f[i].key < end; i++)
-			if (!(bad = reserve(b, 1, e)))
-				put_value(b, f[i].column, f[i].w);
+			if (!(bad = batch_reserve(b, 1, e)))
+				batch_put_value(b, f[i].column, f[i].w);
 		bad = bad || put_block(t, b, order[k].slot, e);
 	}
 	free(order);
@@ -508,33 +482,6 @@ static void clear(struct tally *t)
 	slot_of(t, 0);
 }
 
-static int put_row(struct ff_batch *b, uint32_t side, enum ff_row_kind kind, uint32_t samples,
-                   double scale, double residual, double error, struct err *e)
-{
-	uint64_t blocks = b->block_chain.n;
-	uint8_t k = (uint8_t)kind;
-
-	return vec_append(&b->row_side, &side, 1, sizeof side, e) ||
-	       vec_append(&b->row_kind, &k, 1, sizeof k, e) ||
-	       vec_append(&b->row_samples, &samples, 1, sizeof samples, e) ||
-	       vec_append(&b->row_scale, &scale, 1, sizeof scale, e) ||
-	       vec_append(&b->row_residual, &residual, 1, sizeof residual, e) ||
-	       vec_append(&b->row_error, &error, 1, sizeof error, e) ||
-	       vec_append(&b->row_block, &blocks, 1, sizeof blocks, e) ? -1 : 0;
-}
-
-/* Start arrays hold ends while a batch grows and a leading 0. */
-static int put_zero_starts(struct ff_batch *b, struct err *e)
-{
-	const uint64_t zero = 0;
-
-	if (b->row_block.n)
-		return 0;
-	return vec_append(&b->row_block, &zero, 1, sizeof zero, e) ||
-	       vec_append(&b->block_start, &zero, 1, sizeof zero, e) ||
-	       vec_append(&b->block_arrival, &zero, 1, sizeof zero, e) ? -1 : 0;
-}
-
 int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
                  enum ff_row_kind kind, uint32_t samples, double total, struct err *e)
 {
@@ -543,7 +490,7 @@ int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
 
 	if (t->err.set)
 		return err_set(e, "%s", t->err.text);
-	if (put_zero_starts(b, e) || finish_near(t, b, &f, e))
+	if (batch_begin(b, e) || finish_near(t, b, &f, e))
 		return -1;
 	f.variance += share_variance(t, r->escape, t->escape_square, total, samples);
 	f.sum += r->escape + r->black + r->lost + r->cut;
@@ -552,6 +499,7 @@ int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
 	if (put_block(t, b, 0, e) || finish_far(t, b, e))
 		return -1;
 	clear(t);
-	return put_row(b, row_side, kind, samples, f.sum > 0 ? 1 / f.sum : 0, 1 - f.sum / total,
-	               sqrt(f.variance), e);
+	struct batch_row row = { row_side, kind, samples, f.sum > 0 ? 1 / f.sum : 0,
+	                         1 - f.sum / total, sqrt(f.variance) };
+	return batch_put_row(b, &row, e);
 }

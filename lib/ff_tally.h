@@ -120,6 +120,24 @@ void tally_replicate(struct tally *t);
 int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
                  enum ff_row_kind kind, uint32_t samples, double total, struct err *e);
 
+/* What a row says beside its blocks: as struct ff has it. */
+struct batch_row {
+	uint32_t side;
+	enum ff_row_kind kind;
+	uint32_t samples;
+	double scale, residual, error;
+};
+
+/* A row is put piece by piece: begin, then for each block its values into reserved room and
+ * its arrivals, then the block, last the row. 0, or -1 and e; batch_put_value returns the
+ * value as it is stored. */
+int batch_begin(struct ff_batch *b, struct err *e);
+int batch_reserve(struct ff_batch *b, size_t values, struct err *e);
+double batch_put_value(struct ff_batch *b, uint32_t column, double value);
+int batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *rest,
+                    struct err *e);
+int batch_put_row(struct ff_batch *b, const struct batch_row *r, struct err *e);
+
 /* Chain numbers of the batch and order of links: local -> whole. `map` (vec of
  * uint32_t, CHAIN_NONE = not met yet) belongs to the thread whose chains these
  * are. Called in row order, so numbers do not depend on threads. */
