@@ -15,7 +15,7 @@ struct cell {
 	int n;
 	double v[CELL_CORNERS][3];    /* convex */
 	uint64_t blockers;            /* that may hide something from it */
-	uint32_t cuts;                /* bits of those that may cross it */
+	uint32_t edges, bends;        /* bits of those that may cross it */
 	double most;                  /* about its exchange area if nothing were hidden */
 	double value, error;
 	int bright;                   /* no blocker hid anything from its points */
@@ -98,25 +98,26 @@ static void measure(const struct integral *in, struct cell *c, const struct face
 }
 
 /* The cut that halves a cell best, of those with a blocker that matters to it; forgets
- * cuts that do not cross it. -1 if none is left. */
-static int best_cut(const struct integral *in, struct cell *c, const struct facet *f)
+ * cuts that do not cross it. NULL if none is left. */
+static const struct plane *best_cut(const struct integral *in, const struct shadow_cuts *s,
+                                    uint32_t *bits, const struct cell *c, const struct facet *f)
 {
+	const struct plane *found = NULL;
 	double best = 0;
-	int at = -1;
 
-	for (int i = 0; i < in->shadows.cuts; i++) {
+	for (int i = 0; i < s->n; i++) {
 		double lowest, highest;
-		if (!(c->cuts >> i & 1))
+		if (!(*bits >> i & 1))
 			continue;
-		facet_heights(f, in->shadows.cut[i].normal, in->shadows.cut[i].offset, &lowest, &highest);
-		if (lowest >= -in->near || highest <= in->near || !(in->shadows.of[i] & c->blockers)) {
-			c->cuts &= ~((uint32_t)1 << i);
+		facet_heights(f, s->cut[i].normal, s->cut[i].offset, &lowest, &highest);
+		if (lowest >= -in->near || highest <= in->near || !(s->of[i] & c->blockers)) {
+			*bits &= ~((uint32_t)1 << i);
 		} else if (fmin(-lowest, highest) > best * (highest - lowest)) {
 			best = fmin(-lowest, highest) / (highest - lowest);
-			at = i;
+			found = &s->cut[i];
 		}
 	}
-	return at;
+	return found;
 }
 
 /* The error of a cell's points where no edge is known to cross it: that of its centre
@@ -137,7 +138,7 @@ static double doubt(const struct integral *in, struct cell *c, const struct face
 	int dark = c->value == 0;
 	double off = 0;
 
-	if (!in->cut || best_cut(in, c, f) >= 0)
+	if (!in->cut || best_cut(in, &in->shadows.edges, &c->edges, c, f))
 		return unseen * c->most;
 	if (!(dark || c->bright))
 		return compared ? 0 : surmise(in, c, f);
@@ -155,12 +156,15 @@ static double doubt(const struct integral *in, struct cell *c, const struct face
 static int divide(const struct integral *in, struct cell *c, struct facet_room part[4])
 {
 	struct facet f = cell_facet(c);
-	int i = in->cut ? best_cut(in, c, &f) : -1;
+	const struct plane *cut = NULL;
 
-	if (i < 0)
+	if (in->cut)
+		cut = best_cut(in, &in->shadows.edges, &c->edges, c, &f);
+	if (in->cut && !cut)
+		cut = best_cut(in, &in->shadows.bends, &c->bends, c, &f);
+	if (!cut)
 		return facet_quarter(&f, part) ? 4 : 0;
-	c->cuts &= ~((uint32_t)1 << i);
-	return facet_split(&f, in->shadows.cut[i].normal, in->shadows.cut[i].offset, part) ? 2 : 0;
+	return facet_split(&f, cut->normal, cut->offset, part) ? 2 : 0;
 }
 
 /* Is it sure that the blockers together hide all from a cell that saw nothing? */
@@ -186,7 +190,7 @@ static int refine(struct integral *in, size_t i)
 	((struct cell *)cells->data)[i] = ((struct cell *)cells->data)[--cells->n];
 	for (int k = 0; k < n; k++) {
 		const struct facet *f = &room[k].f;
-		part[left] = (struct cell){ .blockers = c.blockers, .cuts = c.cuts,
+		part[left] = (struct cell){ .blockers = c.blockers, .edges = c.edges, .bends = c.bends,
 		                            .most = c.most * f->area / area };
 		set_corners(&part[left], f);
 		if (settle(in, &part[left], f))
@@ -210,7 +214,7 @@ static int refine(struct integral *in, size_t i)
 static int put_whole(struct integral *in, uint64_t blockers, double most)
 {
 	struct cell c = { .blockers = blockers, .most = most,
-	                  .cuts = (uint32_t)(((uint64_t)1 << in->shadows.cuts) - 1) };
+	                  .edges = UINT32_MAX, .bends = UINT32_MAX };
 
 	set_corners(&c, in->f);
 	if (settle(in, &c, in->f))

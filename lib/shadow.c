@@ -5,11 +5,16 @@
 #include "body_polygons.h"
 #include "vec3.h"
 
+/* Up to how many blockers it pays to look for bends, and where the shadows of two meet:
+ * the cells between many are small anyway. */
+enum { FEW = 3 };
+
 /* ---- cuts ---- */
 
 struct cuts {
 	const struct facet *f, *g;
 	double near;
+	int few;                      /* blockers: it pays to look for more than edges */
 	struct shadows *s;
 };
 
@@ -36,20 +41,18 @@ static int blocker_side(const struct blocker *b, const struct plane *p, double n
 	return begins == ends ? begins : 0;
 }
 
-static void add(struct cuts *c, const struct plane *p, uint64_t of)
+static void add(const struct cuts *c, struct shadow_cuts *s, const struct plane *p, uint64_t of)
 {
-	struct shadows *s = c->s;
-
-	for (int i = 0; i < s->cuts; i++)
+	for (int i = 0; i < s->n; i++)
 		if (fabs(fabs(v3_dot(s->cut[i].normal, p->normal)) - 1) < 1e-12 &&
 		    fabs(fabs(s->cut[i].offset) - fabs(p->offset)) < c->near) {
 			s->of[i] |= of;
 			return;
 		}
-	if (s->cuts == SHADOW_CUTS)
+	if (s->n == SHADOW_CUTS)
 		return;
-	s->of[s->cuts] = of;
-	s->cut[s->cuts++] = *p;
+	s->of[s->n] = of;
+	s->cut[s->n++] = *p;
 }
 
 static void turn_round(struct plane *p)
@@ -67,18 +70,20 @@ static void consider(struct cuts *c, const struct blocker *b, int number, struct
 {
 	struct shadows *s = c->s;
 	int of_g = side_of(p, c->g->v, c->g->n, 3, c->near);
-	int of_f = of_g || kink ? side_of(p, c->f->v, c->f->n, 3, c->near) : 1;
+	int of_f = of_g || kink || c->few ? side_of(p, c->f->v, c->f->n, 3, c->near) : 1;
 
 	if (of_f && of_f != of_g)
 		return;
-	int of_b = of_g ? blocker_side(b, p, c->near) : 0;
+	int of_b = of_g || c->few ? blocker_side(b, p, c->near) : 0;
 	if (of_f) {
 		s->idle |= (uint64_t)(of_b == -of_f) << number;
 		return;
 	}
-	if (kink || of_b)
-		add(c, p, (uint64_t)1 << number);
-	if (of_b != -of_g || !of_b || s->limits == SHADOW_LIMITS)
+	if (kink || (of_g && of_b))
+		add(c, &s->edges, p, (uint64_t)1 << number);
+	else if (c->few && (of_g || of_b))
+		add(c, &s->bends, p, (uint64_t)1 << number);
+	if (!of_g || of_b != -of_g || s->limits == SHADOW_LIMITS)
 		return;
 	if (of_b < 0)
 		turn_round(p);
@@ -126,7 +131,7 @@ static void find_idle(struct cuts *c, const struct blocker *b, int number)
 		if (of_f && of_g == of_f && (b->flat || of_f > 0))
 			c->s->idle |= (uint64_t)1 << number;
 		else if (!of_f && (b->flat || !of_g))
-			add(c, &b->face[i], (uint64_t)1 << number);
+			add(c, &c->s->edges, &b->face[i], (uint64_t)1 << number);
 	}
 	for (int i = 0; i < b->edges && !(c->s->idle >> number & 1); i++)
 		for (int j = 0; j < c->f->n; j++)
@@ -163,23 +168,46 @@ static void gap_cuts(struct cuts *c, const struct blocker *a, const struct block
 			    plane_through(a->edge[i].a, a->edge[i].b, b->edge[j].a, c->near, &p) &&
 			    !side_of(&p, c->f->v, c->f->n, 3, c->near) &&
 			    blocker_side(a, &p, c->near) * blocker_side(b, &p, c->near) < 0)
-				add(c, &p, of);
+				add(c, &c->s->edges, &p, of);
+}
+
+/* Planes through an edge of one blocker and a corner of another with each on one side:
+ * their shadows meet there, or part. */
+static void meeting_cuts(struct cuts *c, const struct blocker *a, const struct blocker *b,
+                         uint64_t of)
+{
+	struct plane p;
+
+	for (int i = 0; i < a->edges; i++)
+		for (int j = 0; j < b->edges; j++) {
+			if (!plane_through(a->edge[i].a, a->edge[i].b, b->edge[j].a, c->near, &p) ||
+			    side_of(&p, c->f->v, c->f->n, 3, c->near))
+				continue;
+			int side = blocker_side(a, &p, c->near);
+			side *= side ? blocker_side(b, &p, c->near) : 0;
+			if (side)
+				add(c, side < 0 ? &c->s->edges : &c->s->bends, &p, of);
+		}
 }
 
 void shadow_edges(const struct blocker *b, int blockers, const struct facet *f,
                   const struct facet *g, double near, struct shadows *s)
 {
-	struct cuts c = { f, g, near, s };
+	struct cuts c = { f, g, near, blockers <= FEW, s };
 
-	s->cuts = s->limits = 0;
+	s->edges.n = s->bends.n = s->limits = 0;
 	s->idle = 0;
 	for (int i = 0; i < blockers; i++) {
 		find_idle(&c, &b[i], i);
 		blocker_cuts(&c, &b[i], i);
 	}
-	for (int i = 0; i < blockers && s->cuts < SHADOW_CUTS; i++)
+	for (int i = 0; i < blockers && s->edges.n < SHADOW_CUTS; i++)
 		for (int j = 0; j < i; j++)
 			gap_cuts(&c, &b[i], &b[j], (uint64_t)1 << i | (uint64_t)1 << j);
+	for (int i = 0; c.few && i < blockers; i++)
+		for (int j = 0; j < blockers; j++)
+			if (j != i)
+				meeting_cuts(&c, &b[i], &b[j], (uint64_t)1 << i | (uint64_t)1 << j);
 }
 
 /* ---- cells ---- */

@@ -6,10 +6,16 @@
 
 enum { SHADOW_CUTS = 32, SHADOW_LIMITS = 96 };
 
-struct shadows {
+struct shadow_cuts {
 	struct plane cut[SHADOW_CUTS];
 	uint64_t of[SHADOW_CUTS];     /* bits of the blockers that each is an edge of */
-	int cuts;
+	int n;
+};
+
+struct shadows {
+	/* Where shadows begin, end or fill differently; and where only how fast they grow
+	 * does: at a corner that the edge of a shadow passes in between. */
+	struct shadow_cuts edges, bends;
 	/* Planes with a blocker in front of them and all of g behind: what of f is behind
 	 * one sees g past that blocker. */
 	struct plane limit[SHADOW_LIMITS];
