@@ -174,8 +174,8 @@ def rows_of(scene, o):
 
 PLOT = """
 set logscale xy
-set grid xtics ytics mxtics lc rgb '#dddddd'
-set key outside right top samplen 2
+set grid xtics ytics mytics lc rgb '#bbbbbb', lc rgb '#e4e4e4'
+set key inside right top samplen 2 opaque
 set multiplot layout {scenes},2
 set xlabel 'processor seconds of mesh, ffcalc and shoot'
 set format y '%g'
