@@ -499,7 +499,9 @@ int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
 	if (put_block(t, b, 0, e) || finish_far(t, b, e))
 		return -1;
 	clear(t);
+	/* All samples in one place tell no more than a sample's weight. */
+	double error = fmax(sqrt(f.variance), 1. / samples);
 	struct batch_row row = { row_side, kind, samples, f.sum > 0 ? 1 / f.sum : 0,
-	                         1 - f.sum / total, sqrt(f.variance) };
+	                         1 - f.sum / total, error };
 	return batch_put_row(b, &row, e);
 }

@@ -77,7 +77,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 	struct ff_options *o = &r->ff;
 
 	*o = (struct ff_options){ .points = 16, .emitter_gain = 8, .lobe_rays = 4096, .depth = 256,
-	                          .seed = 1, .method = FF_AUTO, .evaluations = 20000, .part = 1, .parts = 1 };
+	                          .seed = 1, .method = FF_AUTO, .evaluations = 50000, .part = 1, .parts = 1 };
 	while ((letter = cli_next(c, argc, argv)) != -1) {
 		switch (letter) {
 		case 'o': r->output = optarg; break;

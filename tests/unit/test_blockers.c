@@ -32,7 +32,7 @@ struct lab {
 static void ready(struct lab *l, double absolute)
 {
 	struct err e = { 0 };
-	struct exchange_options o = { .relative = 1e-9, .absolute = absolute, .most = 20000,
+	struct exchange_options o = { .relative = 1e-9, .absolute = absolute, .most = 50000,
 	                              .bodies = SIGHT_BLOCKERS };
 
 	assert_int_equal(facet_set_init(&l->s, &l->m, FACETS_OF_PATCHES, &e), 0);
