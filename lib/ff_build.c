@@ -355,6 +355,20 @@ static int put_chains(struct ff *f, const struct chains *c, struct err *e)
 	return 0;
 }
 
+/* What formulas do not do of what was asked of them. */
+static void count_curved(const struct ff_job *j, struct ff_stats *s)
+{
+	const struct model *m = j->m;
+
+	for (uint32_t ps = 0; ps < 2 * m->patches; ps++) {
+		if (!model_side_modelled(m, ps))
+			continue;
+		s->sides++;
+		s->curved += m->patch_loop[(ps >> 1) + 1] == m->patch_loop[ps >> 1];
+		s->directional |= j->is_ideal[ps] || j->has_lobe[ps] || j->shoots_lobe[ps];
+	}
+}
+
 int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole,
              struct ff_stats *stats, const struct ff_sink *sink,
              const struct progress *progress, struct err *e)
@@ -372,6 +386,8 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 		              "in a model of plane patches without lobes, mirrors and panes");
 	*stats = (struct ff_stats){ 0 };
 	*whole = (struct ff){ .part = o->part, .parts = o->parts };
+	if (!bad && formula)
+		count_curved(&job, stats);
 	whole->patch_begin = (uint32_t)((uint64_t)m->patches * (o->part - 1) / o->parts);
 	whole->patch_end = (uint32_t)((uint64_t)m->patches * o->part / o->parts);
 	run.thread = mem_new((size_t)threads, sizeof *run.thread, "threads", e);

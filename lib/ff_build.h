@@ -38,6 +38,8 @@ struct ff_stats {
 	double pairs[4];      /* analytic: of facets, nothing between; hidden; partly hidden;
 	                         with a crowd between, sampled */
 	double evaluations;
+	size_t sides, curved; /* analytic: modelled patch-sides; those no formula is for */
+	int directional;      /* analytic to patches: lobes, mirrors or panes need rays */
 	double cut;           /* largest fraction of a row cut at the depth limit */
 	double trace_seconds; /* filled in by the caller */
 };

@@ -29,6 +29,10 @@ static const double unproved = .1, unseen = .02, unlikely = 1e-4;
 /* What its centre says of a cell that is not compared yet: nothing better than this. */
 static const double surmised = 1e-3;
 
+/* How many times smaller a quarter's error may be than that of the whole, at most: where a
+ * shadow's edge is not known, the sum over quarters may agree by accident. */
+static const double fall = 4096;
+
 enum { HALVINGS = 5 };        /* of the facet seen, to prove that several blockers hide it */
 
 /* An integral over facet f of what it sees of g. */
@@ -206,7 +210,8 @@ static int refine(struct integral *in, size_t i)
 	double off = fabs(sum + in->settled - before - c.value) / ((several ? 1 : 3) * left);
 	for (int k = 0; k < left; k++) {
 		struct facet f = cell_facet(&part[k]);
-		part[k].error = fmax(off, doubt(in, &part[k], &f, n == 4));
+		double least = n == 4 ? c.error / fall : 0;
+		part[k].error = fmax(fmax(off, least), doubt(in, &part[k], &f, n == 4));
 	}
 	return vec_append(cells, part, (size_t)left, sizeof *part, in->e);
 }

@@ -49,8 +49,6 @@ ABSOLUTE, RELATIVE, OCCLUDED, SAME = 1e-9, 1e-8, 1e-6, 1e-9
 MOVED = ["par_C11_3", "tri_general_2", "tri_edge_10deg", "tri_edge_179deg", "tri_needle",
          "quad_general", "occ_center", "occ_perp_half"]
 
-# Embree finds the plane of a turned sliver in float32, and rays that leave it hit it.
-SLIVERS = ["needle4", "needle5", "needle6", "thin_hinge5", "thin_hinge6"]
 MEDIAN = 0.76489  # of |t|, 3 degrees of freedom
 
 
@@ -170,8 +168,8 @@ def print_table(cases, methods, options):
 class Check:
     """|got - exact| against what is allowed: `bound`, or q times a stated error."""
 
-    def __init__(self, name, off, bound=None, error=None, note="", todo=None):
-        self.name, self.off, self.note, self.todo = name, abs(off), note, todo
+    def __init__(self, name, off, bound=None, error=None, note=""):
+        self.name, self.off, self.note = name, abs(off), note
         self.bound, self.error = bound, error
 
     def within(self, q):
@@ -180,18 +178,13 @@ class Check:
     def judge(self, tap, q):
         allowed = q * self.error if self.bound is None else self.bound
         notes = f"off by {self.off:.3g}, allowed {allowed:.3g}", self.note
-        if self.todo:
-            tap.todo(self.within(q), self.name, self.todo, *notes)
-        else:
-            tap.ok(self.within(q), self.name, *notes)
+        tap.ok(self.within(q), self.name, *notes)
 
 
 def check_value(name, case, r, sampled):
     off, note = r.f[0] - r.exact, f"got {r.f[0]:.17g}, exact {r.exact:.17g}"
     if sampled:
-        sliver = case.id in SLIVERS and r.method == "rays"
-        return Check(name, off, error=r.resolved()[0], note=note,
-                     todo="slivers in float32" if sliver else None)
+        return Check(name, off, error=r.resolved()[0], note=note)
     bound = OCCLUDED if case.occluders else min(ABSOLUTE, RELATIVE * r.exact)
     return Check(name, off, bound, note=note)
 
@@ -254,7 +247,7 @@ def print_tap(cases, methods, options):
     for check in checks:
         check.judge(tap, q)
     if "rays" in methods:
-        judge_stated(tap, [c for c in checks if c.name.endswith(", rays: F12") and not c.todo])
+        judge_stated(tap, [c for c in checks if c.name.endswith(", rays: F12")])
     return tap.finish()
 
 

@@ -111,6 +111,8 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		o->gather = gather >= 0 ? (uint32_t)gather
 		          : o->rays / 16 >= GATHER_LEAST ? o->rays / 16 : least;
 	}
+	if (o->method == FF_ANALYTIC && o->gather == 0)
+		cli_usage(c, "--gather 0: the formulas of -m analytic need rays of the elements");
 	if (o->target == 0)
 		o->target = o->to_patches ? 1e-6 : 1e-4;
 	o->threads = c->threads;
@@ -180,10 +182,16 @@ static void print_report(const struct ff_stats *s, const struct request *r, doub
 	fprintf(out, "rays          %.0f (%.2f Mray/s)\n", s->rays, s->rays / seconds * 1e-6);
 	if (r->ff.method == FF_HEMICUBE)
 		fprintf(out, "pixels        %.0f (%.2f Mpixel/s)\n", s->samples, s->samples / seconds * 1e-6);
-	if (s->pairs[0] > 0)
+	if (s->pairs[0] + s->pairs[1] + s->pairs[2] + s->pairs[3] > 0)
 		fprintf(out, "pairs         %.0f clear, %.0f hidden, %.0f partly (%.1f evaluations each), "
 		        "%.0f sampled\n", s->pairs[0], s->pairs[1], s->pairs[2],
 		        s->evaluations / fmax(1, s->pairs[2]), s->pairs[3]);
+	if (s->curved)
+		fprintf(out, "by rays       %zu of %zu patch-sides are curved\n", s->curved, s->sides);
+	if (r->ff.to_patches && s->directional)
+		fprintf(out, "by rays       what is between patches: there are lobes, mirrors or panes\n");
+	else if (r->ff.to_patches && s->curved)
+		fprintf(out, "by rays       what is between patches: not all are plane\n");
 	fprintf(out, "row sums      within %.3g of 1 before scaling\n", s->worst_residual);
 	fprintf(out, "row error     %.3g mean, %.3g worst (%s)\n", s->mean_error, s->worst_error,
 	        s->samples > 0 ? "standard error, root of squares over receivers"

@@ -30,6 +30,7 @@ done <<'END'
 cornell rays classic
 cornell hemicube corner
 plates hemicube below
+cornell analytic classic
 two-pass rays overview
 END
 

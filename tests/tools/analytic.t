@@ -1,0 +1,67 @@
+#!/bin/sh
+# ffcalc -m analytic --to patches: threads, shards, reciprocity, what it leaves to rays.
+. "$(dirname "$0")/tap.sh"
+
+patches="-m analytic --to patches --precision f64"
+matrix() { inspect --patch-matrix "$1" >"$2"; }
+
+prepare mesh "$scenes/cornell.gltf" -o "$T/a.mesh" -p 25% -e 25%
+prepare ffcalc $patches -j 1 "$T/a.mesh" -o "$T/one.ff"
+prepare ffcalc $patches -j 2 "$T/a.mesh" -o "$T/two.ff"
+check "-j 1 as -j 2" cmp "$T/one.ff" "$T/two.ff"
+
+prepare matrix "$T/one.ff" "$T/0.csv"
+for part in 1 2 3; do
+	prepare ffcalc $patches --part $part/3 "$T/a.mesh" -o "$T/$part.ff"
+	prepare matrix "$T/$part.ff" "$T/$part.csv"
+done
+
+cat >"$T/join.py" <<'END'
+import csv, os, sys
+def rows(number):
+    # A matrix has a column `unmodelled` only where something is.
+    with open(os.path.join(sys.argv[1], f"{number}.csv")) as f:
+        return [{"unmodelled": "0", **row} for row in csv.DictReader(f)]
+assert rows(0) == rows(1) + rows(2) + rows(3)
+END
+check "three shards have the rows of the whole" "$PYTHON" "$T/join.py" "$T"
+
+# Rows are scaled to sum to 1: what is stored is not.
+cat >"$T/reciprocal.py" <<'END'
+import csv, sys
+from collections import defaultdict
+from chain import container, run, table
+area = defaultdict(float)
+for r in table(run("inspect", "--csv", sys.argv[1]).stdout):
+    area[int(r["patch"]), r["side"]] += r["area"]
+area = [area[key] for key in sorted(area)]
+_, arrays = container(sys.argv[2])
+with open(sys.argv[3]) as text:
+    _, *lines = csv.reader(text)
+scale = arrays["row_scale"]
+f = [[float(x) / s for x in line[1:len(area) + 1]] for line, s in zip(lines, scale)]
+assert len(f) == len(area), (len(f), len(area))
+n = range(len(area))
+worst = max(abs(area[i] * f[i][j] / (area[j] * f[j][i]) - 1) for i in n for j in n if f[i][j])
+assert worst <= 4e-15, f"reciprocity is off by {worst}"
+END
+check "reciprocal to rounding" "$PYTHON" "$T/reciprocal.py" "$T/a.mesh" "$T/one.ff" "$T/0.csv"
+
+# says SCENE OPTIONS PATTERN NAME: the report has a line like the pattern.
+says() {
+	prepare mesh "$scenes/$1.gltf" -o "$T/b.mesh" -p 25% -e 25%
+	rm -f "$T/b.ff"
+	ffcalc -m analytic $2 -n 64 "$T/b.mesh" -o "$T/b.ff" >"$T/said" 2>&1
+	check "$4" grep -q "$3" "$T/said"
+}
+says two-pass "-t .1" '^by rays  *1 of 254 patch-sides are curved$' 'says how many patch-sides are curved'
+says two-pass "--to patches -t .1" '^by rays .*: there are lobes, mirrors or panes$' 'says that lobes need rays'
+says mirror-image "--to patches" '^by rays .*: there are lobes, mirrors or panes$' 'says that mirrors need rays'
+says cornell "" '^pairs .* sampled$' 'a few rays do as well'
+refuses 2 'gather' 'no formulas without rays of the elements' \
+	ffcalc -m analytic --gather 0 "$T/a.mesh" -o "$T/out"
+rm -f "$T/b.ff"
+ffcalc $patches "$T/a.mesh" -o "$T/b.ff" >"$T/said" 2>&1
+check "says nothing where all is done by formula" sh -c "! grep -q '^by rays' '$T/said'"
+
+done_testing
