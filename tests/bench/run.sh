@@ -33,10 +33,10 @@ pair() { # NAME OURS-COMMAND BARE-COMMAND
 printf '%-34s %10s %10s   %s\n' "" ours bare ratio
 for scene in cornell clutter; do
 	pair "ffcalc -m rays, $scene, Mray/s" \
-		"rm -f a.ff; '$bin/ffcalc' -n 4096 --gather 0 --emitter-gain 1 --lobe-rays 64 -o a.ff $scene.mesh | field Mray" \
+		"rm -f a.ff; '$bin/ffcalc' -m rays -n 4096 --gather 0 --emitter-gain 1 --lobe-rays 64 -o a.ff $scene.mesh | field Mray" \
 		"bare $scene.mesh 4000000 $threads"
 	pair "ffcalc, gathering, $scene, Mray/s" \
-		"rm -f a.ff; '$bin/ffcalc' --lobe-rays 64 -o a.ff $scene.mesh | field Mray" \
+		"rm -f a.ff; '$bin/ffcalc' -m rays --lobe-rays 64 -o a.ff $scene.mesh | field Mray" \
 		"bare $scene.mesh 4000000 $threads"
 done
 "$bin/ffcalc" -q -n 1024 -o clutter.ff clutter.mesh
