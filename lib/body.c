@@ -11,7 +11,6 @@
 enum { LEAF = 2 };
 
 struct maker {
-	struct body_set *s;
 	struct polygons p;
 	struct side *side;            /* all edges of polygons, sorted by points */
 	size_t sides;
@@ -257,7 +256,7 @@ static int make_tree(struct body_set *s, struct err *e)
 
 int body_set_init(struct body_set *s, const struct model *m, struct err *e)
 {
-	struct maker k = { .s = s, .e = e };
+	struct maker k = { .e = e };
 	int bad = polygons_init(&k.p, m, e);
 	size_t n = k.p.polygon.n;
 

@@ -23,7 +23,6 @@ enum { KEEP_ALL = 1 << 15, KEEP_OF_MANY = 2 };
 
 /* What is being built. */
 struct maker {
-	struct facet_set *s;
 	const struct model *m;
 	double centre[3];
 	struct vec facet, corner;
@@ -143,7 +142,7 @@ static int store_points(struct facet_set *s, struct err *e)
 int facet_set_init(struct facet_set *s, const struct model *m, enum facet_places of,
                    struct err *e)
 {
-	struct maker k = { .s = s, .m = m, .e = e };
+	struct maker k = { .m = m, .e = e };
 	size_t places = 2 * (of == FACETS_OF_PATCHES ? m->patches : m->elements), at = 0;
 
 	*s = (struct facet_set){ .places = places };

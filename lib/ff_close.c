@@ -14,7 +14,6 @@ static const double small_enough = 1e-12; /* of the residual, relative */
 struct normal {
 	const struct doubt *doubt;
 	size_t n, rows;
-	const uint8_t *closed;
 	double *scale;            /* [rows] 1 / root of the diagonal; 0: not asked for */
 };
 
@@ -67,7 +66,7 @@ int ff_close(const struct doubt *doubt, size_t n, size_t rows, const double *mis
 {
 	double *room = mem_new(5 * rows, sizeof *room, "closing rows", e);
 	double *x = room, *r = room + rows, *p = r + rows, *q = p + rows;
-	struct normal a = { doubt, n, rows, closed, room + 4 * rows };
+	struct normal a = { doubt, n, rows, room + 4 * rows };
 
 	if (!room)
 		return -1;
