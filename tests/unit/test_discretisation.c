@@ -122,7 +122,7 @@ static struct outcome run(field *f, double noise)
 	}
 	s.discretisation = calloc(2 * m.elements, sizeof *s.discretisation);
 	assert_int_equal(discretisation_estimate(&m, &s, 2, &e), 0);
-	assert_int_equal(reconstruct(&m, &s, 1, &r, &e), 0);
+	assert_int_equal(reconstruct(&m, &s, PART_ALL, 1, &r, &e), 0);
 	for (size_t i = 0; i < m.elements; i++) {
 		o.exact += m.element_area[i] * square(&m, &r, i, f);
 		o.stated += m.element_area[i] * s.discretisation[2 * i] * s.discretisation[2 * i];
