@@ -41,7 +41,7 @@ static const struct cli_option option_table[] = {
 	{ OPT_HALF, "half", NULL, "colours as 16-bit floats" },
 	{ OPT_COMPRESSION, "compression", "METHOD", "zip (default), zips, piz, rle or none" },
 	{ OPT_MIX, "mix", "NAME=X,...",
-	  "scale light groups; X or X:X:X for each band (see shoot --light-groups)" },
+	  "scale the light of groups by X, or X:X:X for each band" },
 	{ 0, NULL, NULL, NULL }
 };
 
