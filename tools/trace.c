@@ -29,7 +29,7 @@ static const struct cli_option option_table[] = {
 	{ OPT_TARGET, "target", "X,Y,Z", "point it looks at" },
 	{ OPT_UP, "up", "X,Y,Z", "its upright direction (default: 0,1,0)" },
 	{ OPT_FOV, "fov", "DEGREES", "its vertical field of view (default: 50)" },
-	{ 'd', "diffuse", "METHOD", "where diffuse light comes from: mesh" },
+	{ 'd', "diffuse", "METHOD", "where diffuse light comes from: mesh (default) or direct" },
 	{ OPT_SAMPLES, "samples", "N", "positions in each pixel (default: 4; 1: its centre)" },
 	{ OPT_LOBE_SAMPLES, "lobe-samples", "N",
 	  "rays into a finite lobe (default: 0: one, about its axis)" },
