@@ -110,7 +110,7 @@ static inline void small_ff(struct ff *f)
 	const uint8_t kind[] = { FF_DIFFUSE, FF_DIFFUSE, FF_DIFFUSE, FF_REFLECTED };
 	const float value[] = { .25f, .25f, .125f, .125f, .125f, .125f, .5f }, up[] = { 0, 0, 1 };
 	const double scale[] = { 1, 1, 1, 2 }, none[] = { 0, 0, 0, 0, 0 };
-	const double error[] = { .01, 0, .02, 0 }, residual[] = { 1e-7, 0, 0, 0 };
+	const float error[] = { .01f, 0, .02f, 0 }, residual[] = { 1e-7f, 0, 0, 0 };
 	const double escape[] = { .375, 0, 1, .5, 0 }, black[] = { .125, .125, 0, .125, 0 };
 	const uint32_t target[] = { 0 }, source[] = { 2 }, chain[] = { 0 }, rows[] = { 3, FF_NO_ROW };
 
@@ -147,6 +147,7 @@ static inline void small_solution(struct solution *s, const struct model *m)
 		.patch_sides = patch_sides, .links = 1, .shots = 42,
 		.direct = ramp(sides * bands, .5), .caustic = ramp(sides * bands, .25),
 		.indirect = ramp(sides * bands, .125), .error = ramp(sides * bands, .01),
+		.discretisation = ramp(sides * bands, .02),
 		.unshot_emission = ramp(patch_sides * bands, 0),
 		.unshot_diffuse = ramp(patch_sides * bands, 1e-3),
 		.unshot_link = ramp(2 * bands, 1e-3),
