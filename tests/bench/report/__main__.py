@@ -9,6 +9,7 @@ programs). With --work DIR yardsticks are kept there for the next run; remove DI
 scenes or `reference` changed. BUILD says where the programs are (default build)."""
 import argparse
 import os
+import resource
 import shutil
 import sys
 import tempfile
@@ -84,7 +85,8 @@ def blocks_of(run, names):
 
 
 def head(run, begun):
-    took = f"{run.minutes():.1f} minutes"
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    took = f"{run.minutes():.1f} minutes, {used.ru_utime + used.ru_stime:.0f} processor seconds"
     run.bars.append(Bar("this report", f"≤ {MINUTES} minutes on two processors", took,
                         run.minutes() <= MINUTES if run.plan is PLAN else None))
     about = machine() + [("load", f"{begun:.1f} at the start, {load():.1f} at the end: of two processors "

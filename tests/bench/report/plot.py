@@ -15,7 +15,7 @@ set grid xtics ytics lc rgb '#dddddd'
 set border lc rgb '#666666'
 set tics nomirror
 set format '%g'
-set key below samplen 2 width 1
+set key outside right top Left reverse samplen 1.5
 set multiplot layout {down},{across}
 """
 
@@ -63,7 +63,7 @@ def quoted(words):
     return "'" + words.replace("'", "''") + "'"
 
 
-def draw(directory, name, about, panels, across=2, high=340, wide=1000):
+def draw(directory, name, about, panels, across=2, high=330, wide=1200):
     """The panels as name.svg and name.png in the directory; a Plot for the page."""
     panels = [p for p in panels if p.curves]
     if not panels:

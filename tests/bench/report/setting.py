@@ -8,9 +8,8 @@ from chain import run, table
 from measure import fresh, ran
 
 STATED = {  # what the programs say of their own errors
-    "sampling": r"^sampling +([\d.e+-]+)",
-    "discretisation": r"^discretisation +(?:about +)?([\d.e+-]+)",
-    "truncation": r"^truncation +at most ([\d.e+-]+)",
+    "sampling": r"^sampling .*; ([\d.e+-]+) rms",
+    "elements": r"^elements +([\d.e+-]+) relative",
     "residual": r"^residual +([\d.e+-]+)"}
 STATED_PICTURE = r"estimated relative rmse[ :]+([\d.e+-]+)"
 

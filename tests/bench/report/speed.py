@@ -87,7 +87,7 @@ def section(run):
         {run.plan.repeat}. `trace` runs with `{' '.join(map(str, SMOOTH))}`, also for all defaults; a further
         view is one more camera in the same run. *MB* is the peak of memory. *Picture* is the relative rmse of the first
         view at the centres of its pixels, *bias* of its mean, *99 %* the 99th percentile of the
-        relative error of pixels (of R + G + B), all without the pixels that see a lamp or nothing. *Irradiance* is the relative
+        relative error of pixels (lengths over R, G, B), all without the pixels that see a lamp or nothing. *Irradiance* is the relative
         rmse of elements, weighted by area. *Of reference* is what `reference` reaches in the
         same processor seconds, between runs of {', '.join(map(str, run.plan.ladder))} paths a pixel and
         {', '.join(f'{n:g}' for n in run.plan.crowd)} particles, and beyond them by the square root.""")

@@ -1,11 +1,10 @@
 """What the programs state of their own errors, beside what these are."""
-import math
-
 from page import Bar, Table, Title, Words
 from speed import percent
 
-HEAD = ["scene", "solution", "view", "sampling", "discretisation", "irradiance", "stated / true", "picture, stated",
-        "picture", "stated / true"]
+SOLVED = ["scene", "solution", "sampling", "irradiance", "stated / true", "between elements",
+          "picture by elements", "stated / true"]
+SEEN = ["scene", "solution", "trace", "stated", "picture", "stated / true"]
 LEDGER, FACTOR = 1e-12, 2
 
 
@@ -17,15 +16,19 @@ def shown(x):
     return "–" if x is None else f"{x:.2f}"
 
 
-class Statement:
-    def __init__(self, view):
-        solved = view.solved
-        said = [solved.stated[k] for k in ("sampling", "discretisation")]
-        self.irradiance = ratio(math.hypot(*(x or 0 for x in said)), solved.irradiance)
-        self.picture = ratio(view.stated, view.errors.rmse)
-        self.cells = [solved.scene.name, solved.solution.name, f"`{view.name}`" if view.name else "", *map(percent, said),
-                      percent(solved.irradiance), shown(self.irradiance), percent(view.stated, 2),
-                      percent(view.errors.rmse, 2), shown(self.picture)]
+def of_solution(row):
+    """Cells, and stated / true of the irradiance of elements."""
+    solved, true = row.solved, row.solved.irradiance
+    sampling, between = solved.stated["sampling"], solved.stated["elements"]
+    return [row.scene, row.name, percent(sampling), percent(true), shown(ratio(sampling, true)),
+            percent(between), percent(row.view.errors.rmse),
+            shown(ratio(between, row.view.errors.rmse))], ratio(sampling, true)
+
+
+def of_view(view):
+    true = view.errors.rmse
+    return [view.solved.scene.name, view.solved.solution.name, f"`{view.name}`", percent(view.stated, 2),
+            percent(true, 2), shown(ratio(view.stated, true))], ratio(view.stated, true)
 
 
 def bar(what, ratios):
@@ -39,16 +42,18 @@ def bar(what, ratios):
 
 def section(run):
     views = [r.view for r in run.rows] + run.views
-    statements = [Statement(v) for v in views]
-    worst = max((v.solved.stated["residual"] for v in views if v.solved.stated["residual"] is not None),
-                default=None)
+    solved, seen = [of_solution(r) for r in run.rows], [of_view(v) for v in views]
+    residuals = [v.solved.stated["residual"] for v in views if v.solved.stated["residual"] is not None]
+    worst = max(residuals, default=None)
     run.bars += [
-        bar("stated error of pictures", [s.picture for s in statements]),
-        bar("stated error of irradiance", [s.irradiance for s in statements]),
-        Bar("ledger, after every shot", f"≤ {LEDGER:g}", f"{worst:.1e} at most" if worst is not None else "",
-            worst <= LEDGER if worst is not None else None)]
+        bar("stated error of pictures", [r for _, r in seen]),
+        bar("stated error of irradiance, from sampling", [r for _, r in solved]),
+        Bar("ledger, after every shot", f"≤ {LEDGER:g}", f"{worst:.1e} at most" if residuals else "",
+            worst <= LEDGER if residuals else None)]
     yield Title("Stated and true errors")
-    yield Words("""`shoot` states the standard error of sampled form factors and an estimate of what the
-        division into elements costs, `trace` the relative rmse of its picture; beside them the
-        true ones as above. The stated error of irradiance is the root of both squares.""")
-    yield Table("", HEAD, [s.cells for s in statements], left=3)
+    yield Words("""`shoot` states the standard error of the irradiance of elements that follows from the samples in
+        form factors (from above), and how far interpolation *between elements* is off; `trace` the
+        relative rmse of its picture. Beside them the true errors, as above; interpolation is
+        part of the error of a picture by elements (`trace -d mesh`), which has more.""")
+    yield Table("Solutions", SOLVED, [cells for cells, _ in solved], left=2)
+    yield Table("Pictures", SEEN, [cells for cells, _ in seen], left=3)

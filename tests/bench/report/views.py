@@ -26,10 +26,10 @@ RADIANCE = [(3, .045), (5, .035), (17, .022), (52, .015)]        # rpict, measur
 
 
 class Refused:
-    """A view that could not be had."""
+    """Options that a program refused, and why."""
 
-    def __init__(self, solution, options, why):
-        self.name, self.words = options, f"{solution.name}, `trace {options}`: {why}"
+    def __init__(self, name, why):
+        self.name, self.words = name, f"{name}: {why}"
 
 
 def views_of(scene, plan):
@@ -37,13 +37,13 @@ def views_of(scene, plan):
         try:
             solved = Solved(scene, solution, plan.repeat_views, threads=1)
         except Failed as e:
-            yield Refused(solution, "", str(e))
+            yield Refused(solution.name, str(e))
             continue
         for options in traced:
             try:
                 yield View(solved, options, [*options.split(), *CENTRES], plan.repeat_views, 1)
             except Failed as e:
-                yield Refused(solution, options, str(e))
+                yield Refused(f"`trace {options}`", str(e))
 
 
 def cells(view, ladder):
@@ -127,7 +127,7 @@ def section(run):
                    Panel("each further view", "seconds of one processor", "relative rmse, %",
                          further + [reference])])
     yield Table("", HEAD, [cells(v, ladder) for v in views], left=2)
-    refused = [v.words for v in every if isinstance(v, Refused)]
+    refused = list(dict.fromkeys(v.words for v in every if isinstance(v, Refused)))
     if refused:
         yield Words("Could not be had: " + "; ".join(refused) + ".")
     yield from resolved(run, scene)

@@ -45,15 +45,19 @@ class Lattice:
 
 
 class Errors:
-    """Of a picture, all relative: rmse, bias of the mean, 99th percentile of pixels, and
-    what that is of the yardstick itself."""
+    """Of a picture, all relative: rmse, bias of the mean, 99th percentile of pixels (lengths
+    over R, G, B, as exrcmp has them), and what that is of the yardstick itself."""
 
     def __init__(self, a, b, c):
         self.rmse, self.bias = off(a, b, c), float(np.mean(a) / np.mean((b + c) / 2) - 1)
-        colour = [x.sum(0) for x in (a, b, c)]
-        mean = np.maximum((colour[1] + colour[2]) / 2, 1e-30)
-        self.tail = percentile(abs(colour[0] - mean) / mean)
-        self.noise = percentile(abs(colour[1] - colour[2]) / 2 / mean)
+        mean = (b + c) / 2
+        self.tail = percentile(length(a - mean) / length(mean))
+        self.noise = percentile(length(b - c) / 2 / length(mean))
+
+
+def length(colours):
+    """Of each pixel's colour."""
+    return np.maximum(np.sqrt((colours ** 2).sum(0)), 1e-30)
 
 
 def percentile(values):
@@ -138,7 +142,7 @@ class Scene:
         path = self.path(f"{samples}.{seed}.exr")
         if not os.path.exists(path):
             self.reference_cpu += ran("reference", self.path("lattice.mesh"), "-c", self.camera,
-                                      "-s", self.lattice.size, "--centres", "--seed", seed,
+                                      "-s", self.lattice.size, "--centre", "--seed", seed,
                                       "--samples", samples, "--compression", "none", "-o", path).cpu
         planes = picture(path)
         return np.array([planes[c] for c in "RGB"])
@@ -157,7 +161,7 @@ class Scene:
         for samples in counts:
             out = fresh(self.path("ladder.exr"))
             took = ran("reference", self.path("lattice.mesh"), "-c", self.camera, "-s",
-                       self.lattice.size, "--centres", "--seed", 100 + samples, "--samples", samples,
+                       self.lattice.size, "--centre", "--seed", 100 + samples, "--samples", samples,
                        "--compression", "none", "-o", out)
             planes = picture(out)
             a = np.array([planes[c] for c in "RGB"])
