@@ -123,13 +123,13 @@ bench: all $(BENCHES)
 
 # One page of all that is measured, in less than 20 minutes; FULL=1: more, in hours.
 REPORT := BUILD='$(abspath $(BUILD))' CC='$(CC)' OPT='$(OPT)' PYTHON='$(PYTHON)' \
-	$(PYTHON) tests/bench/report --out $(BUILD)/report $(if $(FULL),--full)
+	$(PYTHON) tests/bench/report $(if $(FULL),--full) --out
 report: all $(BUILD)/bench/rays
-	@$(REPORT)
+	@$(REPORT) $(BUILD)/report
 
 # The README's table and plot of speed against error alone.
 report-table: all
-	@$(REPORT) --only speed
+	@$(REPORT) $(BUILD)/report-table --only speed
 
 # The README's table of form factors between patches.
 bench-form-factors: all $(BUILD)/bench/rays

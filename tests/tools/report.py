@@ -70,7 +70,8 @@ def curves(tap):
 
 def page(tap, folder):
     done = subprocess.run([sys.executable, REPORT, "--quick", "--only", "views", "--out", folder],
-                          capture_output=True, text=True, check=False, env={**os.environ, "BUILD": BUILD})
+                          capture_output=True, text=True, check=False,
+                          env={**os.environ, "BUILD": BUILD})
     tap.ok(done.returncode == 0, "a page of tiny samples", *done.stderr.splitlines()[-3:])
     text = {name: "" for name in ("index.html", "report.txt", "views.svg")}
     for name in text:

@@ -33,8 +33,9 @@ from page import Bar, Title, Words
 from plan import FULL, PLAN, QUICK
 from yardstick import Scene
 
-SECTIONS = {"rates": rates.section, "views": views.section, "speed": speed.section, "stated": stated.section,
-            "exact": exact.oracles, "form-factors": exact.form_factors, "lobes": exact.lobes,
+SECTIONS = {"rates": rates.section, "views": views.section, "speed": speed.section,
+            "stated": stated.section, "exact": exact.oracles,
+            "form-factors": exact.form_factors, "lobes": exact.lobes,
             "growth": growth.section}
 MINUTES = 20
 
@@ -89,15 +90,15 @@ def head(run, begun):
     took = f"{run.minutes():.1f} minutes, {used.ru_utime + used.ru_stime:.0f} processor seconds"
     run.bars.append(Bar("this report", f"≤ {MINUTES} minutes on two processors", took,
                         run.minutes() <= MINUTES if run.plan is PLAN else None))
-    about = machine() + [("load", f"{begun:.1f} at the start, {load():.1f} at the end: of two processors "
-                                  "that do nothing else, it is 0 at the start"),
+    about = machine() + [("load", f"{begun:.1f} processes at the start, {load():.1f} at the end; this "
+                                  "report makes it about 2"),
                          ("took", took)]
     yield Words(run.plan.about)
     yield page.bars_table(run.bars)
     yield Title("The machine")
     yield page.Table("", ["", ""], [list(pair) for pair in about], left=2)
-    yield Words("""Other programs on the machine make processor seconds longer, too, up to twice where two
-        threads share a core: trust ratios rather than seconds.""")
+    yield Words("""Other programs on the machine make processor seconds longer, too, up to twice
+        where two threads share a core: trust ratios rather than seconds.""")
 
 
 def arguments():
@@ -107,7 +108,8 @@ def arguments():
     p.add_argument("--work", help="keep all files here (default: a temporary directory)")
     p.add_argument("--full", action="store_true", help="also what takes hours")
     p.add_argument("--quick", action="store_true", help="tiny samples")
-    p.add_argument("--only", action="append", choices=list(SECTIONS), help="this section, may be repeated")
+    p.add_argument("--only", action="append", choices=list(SECTIONS),
+                   help="this section, may be repeated")
     return p.parse_args()
 
 

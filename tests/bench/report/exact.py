@@ -53,12 +53,13 @@ def form_factors(run):
     run.tell("form factors")
     plan = run.plan
     words = [w for scene in plan.ff_scenes for w in ("--scene", scene)]
-    printed, _ = script(FORM_FACTORS, "--tuned", "--fresh", "--repeat", plan.repeat, "--rays", plan.ff_rays, *words)
+    printed, _ = script(FORM_FACTORS, "--tuned", "--fresh", "--repeat", plan.repeat,
+                        "--rays", plan.ff_rays, *words)
     head, rows, rest = markdown(printed)
     yield Title("Form factors between patches, beside View3D")
-    yield Words("""`tests/bench/form_factors.py` on one core: *of bare* is the time over that of a bare Embree
-        loop over 4 million rays; *row sums* the largest error of a row's sum before scaling;
-        *max*, *rms* errors of factors, *worst* their largest relative error.""")
+    yield Words("""`tests/bench/form_factors.py` on one core: *of bare* is the time over that of
+        a bare Embree loop over 4 million rays; *row sums* the largest error of a row's sum
+        before scaling; *max*, *rms* errors of factors, *worst* their largest relative error.""")
     yield Table("`ffcalc`, in this run", head, rows, left=3)
     yield Table("View3D 4.0, measured before", ["scene", "patches", "seconds", "errors"],
                 [r for r in VIEW3D if r[0] in plan.ff_scenes], left=1)

@@ -30,8 +30,8 @@ def room(level=0, gloss=0):
             .polygon((0, 3, 0), (4, 3, 0), (4, 3, 4), (0, 3, 4)), white)
     for i in range(16):
         z = i / 4
-        s.shape(f"stripe {i}", Shape().polygon((0, 0, z + .25), (4, 0, z + .25), (4, 0, z), (0, 0, z)),
-                shiny if i < gloss else grey)
+        stripe = Shape().polygon((0, 0, z + .25), (4, 0, z + .25), (4, 0, z), (0, 0, z))
+        s.shape(f"stripe {i}", stripe, shiny if i < gloss else grey)
     s.shape("lamp", Shape().polygon((1.5, 2.9, 1.5), (2.5, 2.9, 1.5), (2.5, 2.9, 2.5),
                                     (1.5, 2.9, 2.5)), lamp)
     s.shape("table", Shape().box((.5, .7, .5), (1.7, .75, 1.7)), grey)
@@ -119,9 +119,10 @@ def section(run):
                              for i, stage in enumerate(STAGES)]))
     yield Title("Cost as scenes grow")
     yield Words(f"""A room of 4 x 3 x 4 m at default settings but for the sizes of patches and
-        elements; processor seconds of all threads, one run each; a view of 160x160. The exponents are fitted to points of at least {LEAST} s.""")
+        elements; processor seconds of all threads, one run each; a view of 160x160. The
+        exponents are fitted to points of at least {LEAST} s.""")
     yield draw(run.out, "growth", "processor seconds of the stages against the number of patches, "
                "elements, triangles and lobes", panels)
-    yield Table("Exponents: seconds grow as the number to this power", ["grows", "how", *STAGES, "bytes of .ff"],
-                fits, left=2)
+    yield Table("Exponents: seconds grow as the number to this power",
+                ["grows", "how", *STAGES, "bytes of .ff"], fits, left=2)
     yield Table("Seconds", ["grows", "number", *STAGES, "MB of .ff"], rows)

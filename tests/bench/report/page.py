@@ -14,7 +14,8 @@ th { vertical-align: bottom; border-bottom: 1px solid #888; }
 td.left, th.left { text-align: left; white-space: normal; min-width: 5em; }
 .met { background: #e2f2e0; } .missed { background: #f8dedb; } .open { background: #f2f2f2; }
 pre { background: #f6f6f6; padding: 1em; overflow-x: auto; font-size: 12px; line-height: 1.35; }
-img { max-width: 100%; height: auto; } code { background: #f3f3f3; padding: 0 .2em; white-space: nowrap; }
+img { max-width: 100%; height: auto; }
+code { background: #f3f3f3; padding: 0 .2em; white-space: nowrap; }
 """
 MET = {True: ("met", "met"), False: ("not met", "missed"), None: ("not measured", "open")}
 

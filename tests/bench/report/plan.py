@@ -28,15 +28,19 @@ class Plan:
     def left_out(self):
         fewer = [f"{m} on {s}" for (s, m), n in
                  ((k, n) for k, n in self.most.items() if isinstance(k, tuple)) if not n]
-        return f"Left out, for they take too long: {', '.join(fewer)} (`make report FULL=1`)." if fewer else ""
+        return (f"Left out, for they take too long: {', '.join(fewer)} (`make report FULL=1`)."
+                if fewer else "")
 
 
 PLAN = Plan(
-    about="All in one run of less than 20 minutes on two processors; `make report FULL=1` measures more.",
+    about="All in one run of less than 20 minutes on two processors; `make report FULL=1` "
+          "measures more.",
     scenes=("cornell", "two-pass", "clutter"),
-    samples={"cornell": (32768, 32_000_000), "two-pass": (2048, 16_000_000), "clutter": (1024, 16_000_000)},
-    ladder=(1, 4, 16, 64, 256), crowd=(10_000, 100_000, 1_000_000), repeat=1, repeat_views=3, solutions=99,
-    steps=99, ff_scenes=("cube16", "cube24", "room", "city100"), ff_rays=40960, oracles=(), lobes=(),
+    samples={"cornell": (32768, 32_000_000), "two-pass": (2048, 16_000_000),
+             "clutter": (1024, 16_000_000)},
+    ladder=(1, 4, 16, 64, 256), crowd=(10_000, 100_000, 1_000_000), repeat=1, repeat_views=3,
+    solutions=99, steps=99, ff_scenes=("cube16", "cube24", "room", "city100"), ff_rays=40960,
+    oracles=(), lobes=(),
     most={("two-pass", "analytic"): 0, ("clutter", "analytic"): 0, ("clutter", "hemicube"): 0,
           ("clutter", "rays"): 3, ("clutter", "auto"): 3})
 FULL = Plan(

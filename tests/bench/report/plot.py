@@ -15,6 +15,7 @@ set grid xtics ytics lc rgb '#dddddd'
 set border lc rgb '#666666'
 set tics nomirror
 set format '%g'
+set rmargin 21
 set key outside right top Left reverse samplen 1.5
 set multiplot layout {down},{across}
 """
@@ -37,7 +38,8 @@ class Panel:
         """Range and labels: 1, 2, 5 times powers of ten around the points, in long ranges
         the powers alone."""
         values = [p[which] for c in self.curves for p in c.points]
-        low, high = max(s for s in STEPS if s <= min(values)), min(s for s in STEPS if s >= max(values))
+        low = max(s for s in STEPS if s <= min(values))
+        high = min(s for s in STEPS if s >= max(values))
         labels = [s for s in STEPS if low <= s <= high]
         if len(labels) > 8:
             labels = [s for s in labels if f"{s:e}".startswith("1.0")]

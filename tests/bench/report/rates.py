@@ -29,13 +29,17 @@ def section(run):
         solved = Solved(scene, Solution("", ffcalc=["-m", "rays", "-n", 1024]))
         rays, read = bare(scene.path("mesh"), threads)
         primary, _ = bare(scene.path("mesh"), threads, "--camera", scene.camera, scene.size())
-        view = ran("trace", scene.path("rad"), "-c", scene.camera, "-s", "1280x960", "--samples", 4, "-o",
-                   fresh(scene.path("rate.exr")))
-        rows += [row(f"`ffcalc -m rays`, {name}: rays", solved.stages[1].said(r"\(([\d.]+) Mray/s"), rays, "Mray/s"),
-                 row(f"`trace -d mesh`, {name}: rays from the camera", view.said(r"\(([\d.]+) Mray/s"), primary, "Mray/s"),
-                 row(f"`shoot`, {name}: reading of form factors", solved.stages[2].said(r"\(([\d.]+) GB/s"), read, "GB/s")]
+        view = ran("trace", scene.path("rad"), "-c", scene.camera, "-s", "1280x960",
+                   "--samples", 4, "-o", fresh(scene.path("rate.exr")))
+        rows += [row(f"`ffcalc -m rays`, {name}: rays",
+                     solved.stages[1].said(r"\(([\d.]+) Mray/s"), rays, "Mray/s"),
+                 row(f"`trace -d mesh`, {name}: rays from the camera",
+                     view.said(r"\(([\d.]+) Mray/s"), primary, "Mray/s"),
+                 row(f"`shoot`, {name}: reading of form factors",
+                     solved.stages[2].said(r"\(([\d.]+) GB/s"), read, "GB/s")]
     yield Title("What the machine can do")
-    yield Words(f"""Beside each other in this run, {threads} threads: *bare* is an Embree loop over {RAYS // 10**6} million stored rays
-        of the same kind (`tests/bench/rays.c`), or the reading of a buffer of 512 MB. The programs' rates
-        include all that they do with a ray or a factor.""")
+    yield Words(f"""Beside each other in this run, {threads} threads: *bare* is an Embree loop over
+        {RAYS // 10**6} million stored rays of the same kind (`tests/bench/rays.c`), or the
+        reading of a buffer of 512 MB. The programs' rates include all that they do with a ray
+        or a factor.""")
     yield Table("", ["", "ours", "bare", "ratio"], rows)

@@ -15,8 +15,8 @@ OTHERS = [Solution("all defaults"),
           Solution("`mesh -e 2%`, `ffcalc -n 16384`", ["-e", "2%"], ["-n", 16384])]
 # One position in a pixel, its centre, for the yardstick has that too.
 SMOOTH = ["--samples", 1, "--lobe-samples", 16]
-HEAD = ["scene", "setting", "mesh", "ffcalc", "shoot", "first view", "further view", "MB", "picture",
-        "of reference", "bias", "99 %", "irradiance", "of reference"]
+HEAD = ["scene", "setting", "mesh", "ffcalc", "shoot", "first view", "further view", "MB",
+        "picture", "of reference", "bias", "99 %", "irradiance", "of reference"]
 
 
 def percent(x, digits=1):
@@ -84,13 +84,14 @@ def section(run):
         drawn += panels(name, mine, ladders)
     yield Title("Speed against error of all stages")
     yield Words(f"""Processor seconds of each stage, of all threads together; medians of
-        {run.plan.repeat}. `trace` runs with `{' '.join(map(str, SMOOTH))}`, also for all defaults; a further
-        view is one more camera in the same run. *MB* is the peak of memory. *Picture* is the relative rmse of the first
-        view at the centres of its pixels, *bias* of its mean, *99 %* the 99th percentile of the
-        relative error of pixels (lengths over R, G, B), all without the pixels that see a lamp or nothing. *Irradiance* is the relative
-        rmse of elements, weighted by area. *Of reference* is what `reference` reaches in the
-        same processor seconds, between runs of {', '.join(map(str, run.plan.ladder))} paths a pixel and
-        {', '.join(f'{n:g}' for n in run.plan.crowd)} particles, and beyond them by the square root.""")
+        {run.plan.repeat}. `trace` runs with `{' '.join(map(str, SMOOTH))}`, also for all
+        defaults; a further view is one more camera in the same run. *MB* is the peak of memory.
+        *Picture* is the relative rmse of the first view at the centres of its pixels, *bias*
+        of its mean, *99 %* the 99th percentile of the relative error of pixels (lengths over
+        R, G, B), all without the pixels that see a lamp or nothing. *Irradiance* is the
+        relative rmse of elements, weighted by area. *Of reference* is what `reference` reaches
+        in the same processor seconds, between runs of {listed(run.plan.ladder)} paths a pixel
+        and {listed(run.plan.crowd)} particles, and beyond them by the square root.""")
     yield Words("Yardsticks: " + "; ".join(
         f"{s.name}, camera {s.camera} {s.size()}: {s.samples} paths in every ninth pixel, whose "
         f"99 % is {percent(noise(mine_of(run.rows, s.name)))}; {s.particles:g} particles"
@@ -98,6 +99,10 @@ def section(run):
     yield draw(run.out, "speed", "error against processor seconds of four methods of form factors "
                "in three scenes, picture and irradiance, beside path tracing", drawn)
     yield Table("", HEAD, rows, left=2)
+
+
+def listed(numbers):
+    return ", ".join(f"{n:g}" for n in numbers)
 
 
 def mine_of(rows, name):

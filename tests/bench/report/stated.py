@@ -27,8 +27,9 @@ def of_solution(row):
 
 def of_view(view):
     true = view.errors.rmse
-    return [view.solved.scene.name, view.solved.solution.name, f"`{view.name}`", percent(view.stated, 2),
-            percent(true, 2), shown(ratio(view.stated, true))], ratio(view.stated, true)
+    return [view.solved.scene.name, view.solved.solution.name, f"`{view.name}`",
+            percent(view.stated, 2), percent(true, 2),
+            shown(ratio(view.stated, true))], ratio(view.stated, true)
 
 
 def bar(what, ratios):
@@ -43,16 +44,18 @@ def bar(what, ratios):
 def section(run):
     views = [r.view for r in run.rows] + run.views
     solved, seen = [of_solution(r) for r in run.rows], [of_view(v) for v in views]
-    residuals = [v.solved.stated["residual"] for v in views if v.solved.stated["residual"] is not None]
-    worst = max(residuals, default=None)
+    residuals = [v.solved.stated["residual"] for v in views]
+    worst = max((r for r in residuals if r is not None), default=None)
     run.bars += [
         bar("stated error of pictures", [r for _, r in seen]),
         bar("stated error of irradiance, from sampling", [r for _, r in solved]),
-        Bar("ledger, after every shot", f"≤ {LEDGER:g}", f"{worst:.1e} at most" if residuals else "",
-            worst <= LEDGER if residuals else None)]
+        Bar("ledger, after every shot", f"≤ {LEDGER:g}",
+            "" if worst is None else f"{worst:.1e} at most",
+            None if worst is None else worst <= LEDGER)]
     yield Title("Stated and true errors")
-    yield Words("""`shoot` states the standard error of the irradiance of elements that follows from the samples in
-        form factors (from above), and how far interpolation *between elements* is off; `trace` the
+    yield Words("""`shoot` states the standard error of the irradiance of elements that follows
+        from the samples in form factors (from above), and how far interpolation *between
+        elements* is off; `trace` the
         relative rmse of its picture. Beside them the true errors, as above; interpolation is
         part of the error of a picture by elements (`trace -d mesh`), which has more.""")
     yield Table("Solutions", SOLVED, [cells for cells, _ in solved], left=2)

@@ -53,8 +53,8 @@ def cells(view, ladder):
             percent(ladder.at(view.seconds())), percent(ladder.at(view.cpu))]
 
 
-HEAD = ["solution", "trace", "view 1", "view 2 …", "error", "bias", "99 %", "stated", "reference, as view 1",
-        "as view 2 …"]
+HEAD = ["solution", "trace", "view 1", "view 2 …", "error", "bias", "99 %", "stated",
+        "reference, as view 1", "as view 2 …"]
 
 
 def method(view):
@@ -108,20 +108,21 @@ def section(run):
     run.views += views
     run.bars += bars(views)
     yield Title("First and further views of the Cornell box")
-    yield Words(f"""`cornell`, camera `{scene.camera}`, {scene.size()}, one sample at the centre of each pixel;
-        seconds of one processor (`-j 1`), medians of {run.plan.repeat_views}. *View 1* is everything: `mesh`, `ffcalc`, `shoot` and a view;
-        *view 2 …* is what each further one costs, a run of `trace` by itself. *Error* is the rmse
-        over the mean of all pixels that see neither the lamp nor nothing, *bias* that of the mean,
-        *99 %* the 99th percentile of the relative error of pixels; *stated* is the error that `trace` itself prints.
-        The last columns are the error of `reference` after the same processor seconds.""")
+    yield Words(f"""`cornell`, camera `{scene.camera}`, {scene.size()}, one sample at the centre of
+        each pixel; seconds of one processor (`-j 1`), medians of {run.plan.repeat_views}. *View 1*
+        is everything: `mesh`, `ffcalc`, `shoot` and a view; *view 2 …* is what each further one
+        costs, a run of `trace` by itself. *Error* is the rmse over the mean of all pixels that
+        see neither the lamp nor nothing, *bias* that of the mean, *99 %* the 99th percentile of
+        the relative error of pixels; *stated* is the error that `trace` itself prints. The last
+        columns are the error of `reference` after the same processor seconds.""")
     points = lambda name, x: [(x(v), 100 * v.errors.rmse) for v in views if method(v) == name]
     reference = Curve("reference", [(x, 100 * y) for x, y in ladder.points], dashed=True)
     names = [name for name, _, _ in FURTHER]
     first = [Curve(n, sorted(points(n, View.seconds))) for n in names]
     further = [Curve(n, sorted(points(n, lambda v: v.cpu))) for n in names]
-    theirs = Curve("Radiance, measured before", [(x, 100 * y) for x, y in RADIANCE], dashed=True)
-    yield draw(run.out, "views", "error of the Cornell box against the seconds of the first and of each "
-               "further view", [
+    theirs = Curve("Radiance, before", [(x, 100 * y) for x, y in RADIANCE], dashed=True)
+    yield draw(run.out, "views", "error of the Cornell box against the seconds of the first and of "
+               "each further view", [
                    Panel("view 1, everything included", "seconds of one processor", "relative rmse, %",
                          first + [reference, theirs]),
                    Panel("each further view", "seconds of one processor", "relative rmse, %",
