@@ -117,6 +117,18 @@ check "a curved patch: inspect --verify" inspect --verify "$T/ball.ff"
 prepare ffcalc --to patches --precision f64 -t 1e-4 -j 1 "$T/ball.mesh" -o "$T/one.ff"
 check "a curved patch: -j 1 as -j 2" cmp "$T/one.ff" "$T/ball.ff"
 
+# To elements: rows by formula trust their own sum, also where rays miss the receiver.
+cat >"$T/elements.py" <<'END'
+import sys
+lines = [line.split() for line in sys.stdin]
+assert len(lines) == 7, lines
+for case, _, expected, got, *_ in lines[1:]:
+    assert abs(float(got) - float(expected)) <= 1e-8 * float(expected), (case, expected, got)
+END
+check "to elements: six pairs to 1e-8" sh -c "
+$PYTHON '$top/tests/form_factors.py' -m analytic -o '-n 1024' par_C11_1 par_C13_3 tri_vertex \
+	tri_edge_179deg touching5 far3 | $PYTHON '$T/elements.py'"
+
 # says SCENE OPTIONS PATTERN NAME: the report has a line like the pattern.
 says() {
 	prepare mesh "$scenes/$1.gltf" -o "$T/b.mesh" -p 25% -e 25%
