@@ -78,7 +78,7 @@ class Ladder:
         self.points = []
 
     def add(self, cpu, error):
-        if error > 0:
+        if error:
             self.points.append((cpu, error))
 
     def at(self, cpu):
@@ -112,8 +112,8 @@ class Scene:
             lens["yfov"] = self.lattice.narrowed(lens["yfov"])
         with open(self.path("lattice.gltf"), "w") as f:
             json.dump(root, f)
-        for which in ("", "lattice."):
-            run("mesh", self.path(which + "gltf"), "-o", self.path(which + "mesh"))
+        run("mesh", self.gltf, "-o", self.path("default.mesh"))
+        run("mesh", self.path("lattice.gltf"), "-o", self.path("lattice.mesh"))
         self.reference_cpu = 0.0
         self.exact = [self.reference_picture(samples // 2, seed) for seed in (1, 2)]
         self.lit = [self.reference_irradiance(particles // 2, seed) for seed in (1, 2)] \
@@ -150,7 +150,7 @@ class Scene:
     def reference_irradiance(self, particles, seed):
         path = self.path(f"{particles}.{seed}.csv")
         if not os.path.exists(path):
-            self.reference_cpu += ran("reference", self.path("mesh"), "--irradiance", "--seed",
+            self.reference_cpu += ran("reference", self.path("default.mesh"), "--irradiance", "--seed",
                                       seed, "--samples", particles, "-o", path).cpu
         with open(path) as f:
             return table(f.read())
@@ -173,7 +173,7 @@ class Scene:
         ladder = Ladder()
         for particles in counts:
             out = fresh(self.path("ladder.csv"))
-            took = ran("reference", self.path("mesh"), "--irradiance", "--seed", 100 + particles,
+            took = ran("reference", self.path("default.mesh"), "--irradiance", "--seed", 100 + particles,
                        "--samples", particles, "-o", out)
             with open(out) as f:
                 ladder.add(took.cpu, self.irradiance_error(table(f.read())))
