@@ -173,8 +173,8 @@ class Scene:
         ladder = Ladder()
         for particles in counts:
             out = fresh(self.path("ladder.csv"))
-            took = ran("reference", self.path("default.mesh"), "--irradiance", "--seed", 100 + particles,
-                       "--samples", particles, "-o", out)
+            took = ran("reference", self.path("default.mesh"), "--irradiance", "--seed",
+                       100 + particles, "--samples", particles, "-o", out)
             with open(out) as f:
                 ladder.add(took.cpu, self.irradiance_error(table(f.read())))
         return ladder
