@@ -36,7 +36,7 @@ static int get_counts(const struct container *c, struct ff *f, struct err *e)
 }
 
 static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
-                      struct err *e)
+                      uint32_t **most, struct err *e)
 {
 	const int f64 = value_type(c) == DT_F64;
 	const struct field field[] = {
@@ -68,6 +68,7 @@ static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
 		{ &f->link_direction, "link_direction", DT_F32, 2, { f->links, 3 } },
 		{ &f->link_row, "link_row", DT_U32, 2, { f->links, 2 } },
 		{ part, "part", DT_U32, 1, { 4 } },
+		{ most, "chain_most", DT_U32, 1, { 1 } },
 		{ f64 ? (void *)&f->value64 : (void *)&f->value, "value",
 		  f64 ? DT_F64 : DT_F32, 1, { f->entries } },
 	};
@@ -88,14 +89,15 @@ static int get_receivers(const struct container *c, struct ff *f, struct err *e)
 
 static int map_ff(const struct container *c, struct ff *f, struct err *e)
 {
-	uint32_t *part = NULL;
+	uint32_t *part = NULL, *most = NULL;
 
-	if (get_receivers(c, f, e) || get_counts(c, f, e) || map_arrays(c, f, &part, e))
+	if (get_receivers(c, f, e) || get_counts(c, f, e) || map_arrays(c, f, &part, &most, e))
 		return -1;
 	f->patch_begin = part[0];
 	f->patch_end = part[1];
 	f->part = part[2];
 	f->parts = part[3];
+	f->chain_most = *most;
 	return 0;
 }
 

@@ -153,7 +153,7 @@ static int job_init(struct ff_job *j, const struct model *m, const struct ff_opt
 	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
 		side_flags(j, ps);
 	ff_element_table(j);
-	return make_samples(j, e) || make_places(j, e) ? -1 : 0;
+	return make_samples(j, e) || make_places(j, e) || ff_find_chain_most(j, e) ? -1 : 0;
 }
 
 static void job_free(struct ff_job *j)
@@ -179,7 +179,7 @@ static int thread_init(struct ff_thread *t, const struct ff_job *j, struct err *
 	                                    FORMULA_BODIES, 0 };
 
 	*t = (struct ff_thread){ .job = j };
-	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, e))
+	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, j->chain_most, e))
 		return -1;
 	if (j->formula.on) {
 		t->formula = mem_new(1, sizeof *t->formula, "formulas", e);
@@ -203,6 +203,7 @@ static void thread_free(struct ff_thread *t)
 		exchanger_free(t->formula);
 	free(t->formula);
 	free(t->captures.data);
+	free(t->pairs.data);
 	free(t->sights.data);
 	free(t->item);
 	free(t->view);
@@ -377,7 +378,7 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 	struct chains chains = { 0 };
 	int threads = o->threads > 0 ? o->threads : 1;
 	struct run run = { .job = &job };
-	int bad = job_init(&job, m, o, e) || chains_init(&chains, m, e);
+	int bad = job_init(&job, m, o, e) || chains_init(&chains, m, job.chain_most, e);
 	int formula = o->method == FF_ANALYTIC || o->method == FF_AUTO;
 	int matrix = !bad && formula && o->to_patches && ff_matrix_can(&job);
 
@@ -385,7 +386,7 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 		bad = err_set(e, "--close needs factors to patches by formula (-m auto --to patches) "
 		              "in a model of plane patches without lobes, mirrors and panes");
 	*stats = (struct ff_stats){ 0 };
-	*whole = (struct ff){ .part = o->part, .parts = o->parts };
+	*whole = (struct ff){ .part = o->part, .parts = o->parts, .chain_most = job.chain_most };
 	if (!bad && formula)
 		count_curved(&job, stats);
 	whole->patch_begin = (uint32_t)((uint64_t)m->patches * (o->part - 1) / o->parts);

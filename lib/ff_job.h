@@ -62,6 +62,7 @@ struct ff_job {
 	uint8_t *has_lobe;        /* [2P] light arriving here leaves by a finite lobe */
 	uint8_t *emits;           /* [2P] gives light of its own */
 	uint8_t *is_source;       /* [2P] any light leaves here */
+	uint32_t chain_most;      /* where counts of ideal events of a colour stop */
 	struct ff_samples of_rows, of_gathering;
 	struct tally_places places;
 	struct ff_gather gather;
@@ -97,8 +98,10 @@ struct ff_thread {
 	struct tally tally;
 	struct rng rng;
 	struct vec captures;      /* struct capture */
+	struct vec pairs;         /* struct capture */
 	int capturing;
 	double capture_weight;    /* of a capture, per weight of the ray */
+	uint32_t lobe_depth;      /* lobes that the row's light is followed through */
 	struct capture now;       /* the sample being followed, while capturing */
 	struct hemicube cube;
 	uint32_t *item;           /* hemicube: [points][2 sides][pixels] of the patch */
@@ -110,6 +113,10 @@ struct ff_thread {
 	uint32_t lobes;
 	struct vec chain_map;     /* local -> whole */
 };
+
+/* Sets job->chain_most: as high as keeps chains few, by what a few rays meet. O(depth)
+ * rays. 0, or -1 and e. */
+int ff_find_chain_most(struct ff_job *j, struct err *e);
 
 /* Fills job->element. O(elements). */
 void ff_element_table(struct ff_job *j);

@@ -91,18 +91,19 @@ static void into_chain(struct sender *s, uint32_t chain, const double *x, const 
 		flux[k] += x[k] * part[k];
 }
 
-/* Flux x of chain c on ideal patch-side: what goes on by R and by T. Chains that no
- * sample of the row followed stay in chain_flux and end up as cut. */
-static void go_on(struct sender *s, uint32_t chain, uint32_t material, int side,
+/* Flux x of a chain on a patch-side: what goes on by R and by T, by lobes too if these are
+ * followed. Chains that no sample of the row followed stay in chain_flux and end up as
+ * cut. */
+static void go_on(struct sender *s, uint32_t chain, uint32_t surface, int lobes,
                   const double *x)
 {
 	const struct materials *mt = &s->m->material;
 	const struct chains *c = &s->t->chains;
-	size_t at = material_at(mt, material, side);
+	size_t at = material_at(mt, surface >> 1, (int)(surface & 1));
 
 	for (int transmitted = 0; transmitted < 2; transmitted++) {
-		uint32_t slot = c->slot[4 * material + 2 * (uint32_t)side + (uint32_t)transmitted];
-		if (slot == CHAIN_NONE)
+		uint32_t slot = c->slot[2 * surface + (uint32_t)transmitted];
+		if (slot == CHAIN_NONE || (c->finite[slot] && !lobes))
 			continue;
 		uint32_t child = ((const uint32_t *)c->child.data)[(size_t)chain * c->events + slot];
 		if (child == chain) /* summed by go_round */
@@ -176,6 +177,8 @@ static ALWAYS_INLINE void land_special(const struct landing l, uint64_t run, uin
 	l.s->unshot_diffuse[(target ^ 1) * l.groups + l.group] += other;
 	sum->kept[0] += same + other;
 	sum->absorbed[0] += part[PART_ABSORBED * l.groups] * x;
+	if (link == RUN_FOLLOWED)
+		return;
 	if (link == FF_NO_ROW) {
 		sum->cut += lobes;
 		return;
@@ -225,7 +228,7 @@ static void send_block(struct sender *s, const struct block *block, int freshnes
 	             (double)(block[1].run - block->special) * sizeof *t->run_link);
 }
 
-/* What goes on from a block's ideal runs when x is its flux by unit of the values. */
+/* What goes on from a block's runs that are followed when x is its flux by unit of the values. */
 static void send_on(struct sender *s, const struct block *block, const double *x)
 {
 	const struct transport *t = s->t;
@@ -233,9 +236,10 @@ static void send_on(struct sender *s, const struct block *block, const double *x
 
 	for (uint64_t i = block->ideal; i < block[1].run; i++) {
 		uint32_t surface = s->surface[t->run_target[i]];
+		uint32_t link = t->run_link[block->link + (i - block->special)];
 		for (int k = 0; k < s->bands; k++)
 			landed[k] = x[k] * t->run_sum[i];
-		go_on(s, block->chain, surface >> 1, (int)(surface & 1), landed);
+		go_on(s, block->chain, surface, link == RUN_FOLLOWED, landed);
 	}
 }
 

@@ -5,8 +5,8 @@
  * k, and unit flux is shot at most (q_0 + ... + q_{K-1}) / (1 - q_K) times more, with
  * the largest q over all sides, once q_K < 1, since every K shots repeat the
  * argument. The first step alone gives the familiar 1 / (1 - a), a = the largest
- * albedo. A shot arrives once at its first landing and once more after each ideal
- * surface: the largest number of arrivals a row makes multiplies the bound. */
+ * albedo. A shot arrives once at its first landing and once more after each event that
+ * its row follows: the largest number of arrivals a row makes multiplies the bound. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,6 +24,7 @@ struct tail {
 	double *in;           /* [blocks][bands] flux by each block of unit flux, over its sum */
 	double *row;          /* [rows][bands] */
 	lanes *q;             /* [2P][groups] */
+	lanes *plain;         /* [2P][groups] the same without what lobes send on */
 	double arrivals;      /* largest of a row */
 	double bytes;         /* of runs read */
 };
@@ -53,8 +54,12 @@ static lanes block_step(const struct tail *x, uint64_t b, size_t group)
 	const struct transport *t = x->t;
 	lanes sum = { 0 };
 
-	for (uint64_t i = t->block[b].run; i < t->block[b + 1].run; i++)
-		sum += t->run_sum[i] * x->q[t->run_target[i] * x->groups + group];
+	const struct block *block = &t->block[b];
+	for (uint64_t i = block->run; i < block[1].run; i++) {
+		int followed = i >= block->special &&
+		               t->run_link[block->link + (i - block->special)] == RUN_FOLLOWED;
+		sum += t->run_sum[i] * (followed ? x->plain : x->q)[t->run_target[i] * x->groups + group];
+	}
 	return sum;
 }
 
@@ -76,8 +81,9 @@ static void rows_step(void *arg, size_t begin, size_t end, int thread)
 	}
 }
 
-/* Of flux arriving on a side, what is unshot again times what its rows make of it. */
-static double side_step(const struct tail *x, uint32_t ps, size_t k)
+/* Of flux arriving on a side, what is unshot again times what its rows make of it; `plain`
+ * gets what that is without lobes. */
+static double side_step(const struct tail *x, uint32_t ps, size_t k, double *plain)
 {
 	const struct transport *t = x->t;
 	const struct materials *mt = &t->m->material;
@@ -92,18 +98,19 @@ static double side_step(const struct tail *x, uint32_t ps, size_t k)
 	for (uint64_t l = 2 * t->target_link[ps]; l < 2 * t->target_link[ps + 1]; l++)
 		if (t->link_row[l] != FF_NO_ROW)
 			lobe[l & 1] = fmax(lobe[l & 1], x->row[t->link_row[l] * x->bands + k]);
+	*plain = q;
 	return q + mt->rho_s[at] * lobe[0] + mt->tau_s[at] * lobe[1];
 }
 
-static double albedo_shot(const struct transport *t, uint32_t ps, size_t k)
+static double albedo_shot(const struct transport *t, uint32_t ps, size_t k, double *plain)
 {
 	const struct materials *mt = &t->m->material;
 	uint32_t material = model_patch_material(t->m, ps >> 1);
 	int side = (int)(ps & 1);
 	size_t at = material_at(mt, material, side) + k;
 
-	return mt->rho_d[at] + mt->tau_d[at] +
-	       (bsdf_has_lobe(mt, material, side, 0) ? mt->rho_s[at] : 0) +
+	*plain = mt->rho_d[at] + mt->tau_d[at];
+	return *plain + (bsdf_has_lobe(mt, material, side, 0) ? mt->rho_s[at] : 0) +
 	       (bsdf_has_lobe(mt, material, side, 1) ? mt->tau_s[at] : 0);
 }
 
@@ -116,8 +123,11 @@ static double sides_step(struct tail *x, int first)
 	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
 		for (size_t k = 0; k < x->bands; k++) {
 			double *q = (double *)(x->q + ps * x->groups) + k;
-			*q = !model_side_modelled(m, ps) ? 0
-			   : first ? albedo_shot(x->t, ps, k) : side_step(x, ps, k);
+			double *plain = (double *)(x->plain + ps * x->groups) + k;
+			*q = *plain = 0;
+			if (model_side_modelled(m, ps))
+				*q = first ? albedo_shot(x->t, ps, k, plain)
+				           : side_step(x, ps, k, plain);
 			top = fmax(top, *q);
 		}
 	return top;
@@ -144,13 +154,14 @@ double radiosity_tail_bound(const struct transport *t, int threads, double *byte
 	size_t bands = (size_t)t->m->bands;
 	struct tail x = { .t = t, .bands = bands, .groups = lanes_groups(t->m->bands),
 	                  .arrivals = 1 };
-	void *room;
+	void *room[2];
 	double bound = INFINITY;
 
 	x.in = mem_new(t->blocks, bands * sizeof(double), "bound", &e);
 	x.row = mem_new(t->rows, bands * sizeof(double), "bound", &e);
-	x.q = lanes_new(2 * t->m->patches * x.groups, &room, "bound", &e);
-	if (sender_init(&sender, t, &e) == 0 && x.in && x.row && x.q) {
+	x.q = lanes_new(2 * t->m->patches * x.groups, &room[0], "bound", &e);
+	x.plain = lanes_new(2 * t->m->patches * x.groups, &room[1], "bound", &e);
+	if (sender_init(&sender, t, &e) == 0 && x.in && x.row && x.q && x.plain) {
 		unit_rows(&x, &sender);
 		bound = series(&x, threads);
 		*bytes += x.bytes;
@@ -158,6 +169,7 @@ double radiosity_tail_bound(const struct transport *t, int threads, double *byte
 	sender_free(&sender);
 	free(x.in);
 	free(x.row);
-	free(room);
+	free(room[0]);
+	free(room[1]);
 	return bound;
 }

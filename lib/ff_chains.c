@@ -1,0 +1,88 @@
+/* How far chains of ideal events are told apart: a few rays are followed to see which
+ * chains the scene makes. Two mirrors that face each other make two of each length; a
+ * kaleidoscope of many colours makes all that there are. */
+#include <stdlib.h>
+
+#include "ff_job.h"
+#include "lobe.h"
+
+enum {
+	SIDES = 64, RAYS = 16,    /* patch-sides that send, and rays from each */
+	ROOM = 1 << 21,           /* blocks that all rows together may have */
+	CHAINS_LEAST = 64, CHAINS_AIM = 4096,
+	BEFORE_DEPTH = 4          /* light is summed as a series well before rays are cut */
+};
+
+static int any_coloured(const struct chains *c)
+{
+	for (uint32_t i = 0; i < c->events; i++)
+		if (!c->finite[i] && c->most[i] > 1)
+			return 1;
+	return 0;
+}
+
+/* Rays of every source, or of as many as evenly spaced ones; the chains that they make are
+ * in t->tally.chains. */
+static void send(struct ff_thread *t)
+{
+	const struct ff_job *j = t->job;
+	uint32_t sides = 2 * (uint32_t)j->m->patches, step = sides / SIDES + 1;
+
+	for (uint32_t ps = 0; ps < sides; ps += step) {
+		if (!j->is_source[ps])
+			continue;
+		uint64_t seed = rng_mix(j->o.seed ^ ps);
+		for (uint32_t i = 0; i < RAYS; i++) {
+			double x[3], n[3], dir[3];
+			double u[2] = { rng_sobol(i, 2, seed), rng_sobol(i, 3, seed) };
+			uint32_t el = ff_point(j, ps >> 1, rng_sobol(i, 0, seed),
+			                       rng_sobol(i, 1, seed), x);
+			ff_normal(j, el, (int)(ps & 1), n);
+			lobe_sample_cosine(n, u, dir);
+			ray_leave(j->rays, n, x);
+			ff_follow(t, x, dir, 1, 0);
+		}
+	}
+}
+
+/* How many of these chains are left when counts stop at `most`, or CHAIN_NONE and e. */
+static uint32_t count_chains(const struct ff_job *j, const struct chains *all, uint32_t most,
+                             struct err *e)
+{
+	struct chains c;
+	uint32_t *count = mem_new(all->events, sizeof *count, "chains", e);
+	int bad = chains_init(&c, j->m, most, e) || !count;
+
+	for (uint32_t i = 0; !bad && i < all->n; i++) {
+		for (uint32_t k = 0; k < all->events; k++) {
+			uint32_t n = chains_count(all, i)[k];
+			count[k] = n < c.most[k] ? n : c.most[k];
+		}
+		bad = chains_find(&c, count, e) == CHAIN_NONE;
+	}
+	uint32_t n = bad ? CHAIN_NONE : (uint32_t)c.n;
+	chains_free(&c);
+	free(count);
+	return n;
+}
+
+int ff_find_chain_most(struct ff_job *j, struct err *e)
+{
+	struct ff_thread t = { .job = j };
+	size_t aim = ROOM / (2 * j->m->patches + 1);
+	uint32_t n = 0;
+
+	aim = aim < CHAINS_LEAST ? CHAINS_LEAST : aim > CHAINS_AIM ? CHAINS_AIM : aim;
+	j->chain_most = j->o.depth / BEFORE_DEPTH + 1;
+	int bad = tally_init(&t.tally, j->m, &j->places, j->has_lobe, j->chain_most, e);
+	if (!bad && any_coloured(&t.tally.chains)) {
+		t.rng = rng_seed(j->o.seed, 0);
+		send(&t);
+		bad = t.tally.err.set ? err_set(e, "%s", t.tally.err.text) : 0;
+		while (!bad && (n = count_chains(j, &t.tally.chains, j->chain_most, e)) > aim &&
+		       n != CHAIN_NONE && j->chain_most > 1)
+			j->chain_most = j->chain_most * 3 / 4;
+	}
+	tally_free(&t.tally);
+	return bad || n == CHAIN_NONE ? -1 : 0;
+}
