@@ -10,15 +10,23 @@ enum {
 	SIDES = 64, RAYS = 16,    /* patch-sides that send, and rays from each */
 	ROOM = 1 << 21,           /* blocks that all rows together may have */
 	CHAINS_LEAST = 64, CHAINS_AIM = 4096,
-	BEFORE_DEPTH = 4          /* light is summed as a series well before rays are cut */
+	CHANGES = 2               /* the least: tells events that change colours from others */
 };
 
-static int any_coloured(const struct chains *c)
+/* Where counts stop so that no chain is longer than rays are followed; *coloured: ideal
+ * events that change colours. */
+static uint32_t by_depth(const struct ff_job *j, const struct chains *c, uint32_t *coloured)
 {
-	for (uint32_t i = 0; i < c->events; i++)
-		if (!c->finite[i] && c->most[i] > 1)
-			return 1;
-	return 0;
+	uint32_t others = j->o.lobe_depth;
+
+	*coloured = 0;
+	for (uint32_t i = 0; i < c->events; i++) {
+		*coloured += !c->finite[i] && c->most[i] > 1;
+		others += !c->finite[i] && c->most[i] == 1;
+	}
+	uint32_t left = j->o.depth > others ? j->o.depth - others : 0;
+	uint32_t each = left / (*coloured ? *coloured : 1);
+	return each > CHANGES ? each : CHANGES;
 }
 
 /* Rays of every source, or of as many as evenly spaced ones; the chains that they make are
@@ -70,18 +78,24 @@ int ff_find_chain_most(struct ff_job *j, struct err *e)
 {
 	struct ff_thread t = { .job = j };
 	size_t aim = ROOM / (2 * j->m->patches + 1);
-	uint32_t n = 0;
+	uint32_t n = 0, coloured = 0;
 
 	aim = aim < CHAINS_LEAST ? CHAINS_LEAST : aim > CHAINS_AIM ? CHAINS_AIM : aim;
-	j->chain_most = j->o.depth / BEFORE_DEPTH + 1;
+	j->chain_most = CHANGES;
 	int bad = tally_init(&t.tally, j->m, &j->places, j->has_lobe, j->chain_most, e);
-	if (!bad && any_coloured(&t.tally.chains)) {
+	if (!bad)
+		j->chain_most = by_depth(j, &t.tally.chains, &coloured);
+	if (!bad && coloured) {
+		tally_free(&t.tally);
+		bad = tally_init(&t.tally, j->m, &j->places, j->has_lobe, j->chain_most, e);
+	}
+	if (!bad && coloured) {
 		t.rng = rng_seed(j->o.seed, 0);
 		send(&t);
 		bad = t.tally.err.set ? err_set(e, "%s", t.tally.err.text) : 0;
 		while (!bad && (n = count_chains(j, &t.tally.chains, j->chain_most, e)) > aim &&
-		       n != CHAIN_NONE && j->chain_most > 1)
-			j->chain_most = j->chain_most * 3 / 4;
+		       n != CHAIN_NONE && j->chain_most > CHANGES)
+			j->chain_most = (j->chain_most * 3 + 1) / 4;
 	}
 	tally_free(&t.tally);
 	return bad || n == CHAIN_NONE ? -1 : 0;

@@ -1,5 +1,6 @@
 /* Form factors by rays: cosine-distributed directions jointly stratified with the
  * position on the patch (Owen-scrambled Sobol points in four dimensions). */
+#include <math.h>
 #include <string.h>
 
 #include "ff_job.h"
@@ -11,7 +12,8 @@ enum { MAX_SPLITS = 4 };
 struct flight {
 	double org[3], dir[3], w;
 	uint32_t chain;
-	uint32_t passed;   /* ideal surfaces and lobes so far */
+	uint32_t round;    /* events of a colour since the chain was last a new one */
+	uint32_t idle;     /* others since the last of these */
 	uint32_t lobes;
 	int tallied;       /* its landing is known already */
 	int splits;
@@ -30,15 +32,24 @@ static void capture(struct ff_thread *t, uint32_t source, uint32_t chain, double
 		vec_append(&t->captures, &c, 1, sizeof c, &t->tally.err);
 }
 
-/* Where a hit lies, from the triangle's corners: exact to the rounding of doubles. */
-static void hit_point(const struct model *m, const struct ray_hit *hit, double x[3])
+/* Where a hit lies, from the triangle's corners, in doubles; clear of its edges by a few
+ * float32 steps of the scene, beyond which light would leave through the seam of a corner. */
+static void hit_point(const struct ff_job *j, const struct ray_hit *hit, double x[3])
 {
-	const uint32_t *corner = &m->triangle[3 * (size_t)hit->triangle];
+	const uint32_t *corner = &j->m->triangle[3 * (size_t)hit->triangle];
+	const double *v[3];
+	double edge[2][3], normal[3], w[3], sum = 0;
 
+	for (int i = 0; i < 3; i++)
+		v[i] = &j->m->vertex[3 * (size_t)corner[i]];
+	v3_sub(v[1], v[0], edge[0]);
+	v3_sub(v[2], v[0], edge[1]);
+	v3_cross(edge[0], edge[1], normal);
+	double least = fmin(.1, 4 * ray_offset(j->rays) / sqrt(v3_length(normal)));
+	for (int i = 0; i < 3; i++)
+		sum += w[i] = fmax(hit->w[i], least);
 	for (int k = 0; k < 3; k++)
-		x[k] = hit->w[0] * m->vertex[3 * (size_t)corner[0] + (size_t)k] +
-		       hit->w[1] * m->vertex[3 * (size_t)corner[1] + (size_t)k] +
-		       hit->w[2] * m->vertex[3 * (size_t)corner[2] + (size_t)k];
+		x[k] = (w[0] * v[0][k] + w[1] * v[1][k] + w[2] * v[2][k]) / sum;
 }
 
 /* The direction of a flight that goes on by event `slot`, n the normal of the side it
@@ -71,22 +82,26 @@ static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_
 
 	if (chain == CHAIN_NONE)
 		return 0;
-	if (in->passed >= t->job->o.depth) {
-		/* A chain that leads back to itself is summed as a series, of which the
-		 * passes so far are sample enough; any other ends here. */
-		if (chain != in->chain)
-			tally_rest(&t->tally, chain)->cut += w;
+	/* A chain that leads back to itself is summed as a series, of which so many rounds
+	 * are sample enough, as many of each ray; a longer chain is not followed. */
+	int coloured = t->tally.chains.most[slot] > 1;
+	uint32_t rounds = t->job->o.depth / 8 * 2 + 2; /* even: two mirrors take turns */
+	out->round = chain == in->chain ? in->round + (uint32_t)coloured : 0;
+	out->idle = coloured ? 0 : in->idle + 1;
+	if (out->round >= rounds || out->idle > t->job->o.depth)
+		return 0;
+	if (chain != in->chain && chains_length(&t->tally.chains, chain) > t->job->o.depth) {
+		tally_rest(&t->tally, chain)->cut += w;
 		return 0;
 	}
 	ff_normal(t->job, element, transmitted ? !hit->side : hit->side, n);
-	hit_point(t->job->m, hit, out->org);
+	hit_point(t->job, hit, out->org);
 	double part = turn(t, slot, in->dir, n, out->dir);
 	if (part < 1)
 		tally_rest(&t->tally, chain)->lost += w * (1 - part);
 	ray_leave(t->job->rays, n, out->org);
 	out->w = w * part;
 	out->chain = chain;
-	out->passed = in->passed + 1;
 	out->lobes = in->lobes + t->tally.chains.finite[slot];
 	out->tallied = 0;
 	return part > 0;
