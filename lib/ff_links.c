@@ -2,15 +2,19 @@
  * directional patch-side sees.
  *
  * The paper takes one direction from a source patch to the directional patch and
- * weighs the hemicube with cos^k about its mirror image. Here the pair of patches
- * is sampled: each sample has its own point and direction, distributed as the
- * diffuse light that really comes from that source (the patch-side's own rays,
- * read backwards), and the lobe about ITS mirrored direction is sampled with
- * density cos^k over the whole lobe. Thus no direction is quantised, the
- * normaliser is never a sum that can miss (eq. 3 with its sum over everything the
- * lobe sees), and any exponent works alike. */
+ * weighs the hemicube with cos^k about its mirror image (o.centroid does so, but for
+ * the sum). Here the pair of patches is sampled: each sample has its own point and
+ * direction, distributed as the diffuse light that really comes from that source (the
+ * patch-side's own rays, read backwards, or lines to an emitter), and the lobe about
+ * ITS mirrored direction is sampled with density cos^k over the whole lobe. Thus no
+ * direction is quantised, the normaliser is never a sum that can miss (eq. 3 with its
+ * sum over everything the lobe sees), and any exponent works alike.
+ *
+ * A link is right for light that leaves its source evenly. Light that leaves a lobe does
+ * not: its rays are followed on from where they land, through further lobes. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "bsdf.h"
 #include "ff_job.h"
@@ -61,6 +65,22 @@ static int sort_captures(struct ff_thread *t, struct err *e)
 	return 0;
 }
 
+/* A point of a patch-side to draw a line from: with hemicubes, where one of them stands. */
+static void line_begin(const struct ff_thread *t, uint32_t ps, uint32_t i, uint64_t seed,
+                       struct capture *c)
+{
+	const struct ff_job *j = t->job;
+
+	c->view = i % j->o.points;
+	if (j->o.method == FF_HEMICUBE) {
+		const struct view *v = &t->view[2 * c->view + (ps & 1)];
+		c->element = v->element;
+		memcpy(c->x, v->eye, sizeof c->x);
+	} else {
+		c->element = ff_point(j, ps >> 1, rng_sobol(i, 0, seed), rng_sobol(i, 1, seed), c->x);
+	}
+}
+
 /* Straight lines `begin` to `end` from a patch-side to a source: those that are clear are
  * appended as captures that weigh what light of the source comes along them. */
 static int probe(struct ff_thread *t, uint32_t ps, uint32_t source, uint32_t begin,
@@ -70,9 +90,9 @@ static int probe(struct ff_thread *t, uint32_t ps, uint32_t source, uint32_t beg
 	uint64_t seed = rng_mix(j->o.seed ^ (((uint64_t)ps << 32) | source));
 
 	for (uint32_t i = begin; i < end; i++) {
-		struct capture c = { .source = source, .view = i % j->o.points };
+		struct capture c = { .source = source };
 		double y[3], nx[3], ny[3];
-		c.element = ff_point(j, ps >> 1, rng_sobol(i, 0, seed), rng_sobol(i, 1, seed), c.x);
+		line_begin(t, ps, i, seed, &c);
 		uint32_t el = ff_point(j, source >> 1, rng_sobol(i, 2, seed), rng_sobol(i, 3, seed), y);
 		ff_normal(j, c.element, (int)(ps & 1), nx);
 		ff_normal(j, el, (int)(source & 1), ny);
@@ -186,6 +206,53 @@ static void cast_one(struct ff_thread *t, const struct capture *c, int side, int
 		cast(t, c, out, dir, w);
 }
 
+static void centroid(const struct model *m, uint32_t patch, double c[3])
+{
+	memset(c, 0, 3 * sizeof *c);
+	for (uint32_t el = m->patch_start[patch]; el < m->patch_start[patch + 1]; el++)
+		for (int k = 0; k < 3; k++)
+			v3_mad(c, m->element_area[el] / (3 * m->patch_area[patch]),
+			       &m->vertex[3 * (size_t)m->element[3 * (size_t)el + (size_t)k]], c);
+}
+
+static void mean_direction(const struct capture *c, size_t n, double mean[3])
+{
+	memset(mean, 0, 3 * sizeof *mean);
+	for (size_t i = 0; i < n; i++)
+		v3_mad(mean, c[i].w, c[i].l, mean);
+	v3_normalise(mean);
+}
+
+/* Captures as the paper has them: light comes from the source's centroid to that of the
+ * patch, all over which it is alike. By a mirror, or from a source of which the patch sees a
+ * part that its centroid is not in, it comes from the mean of the captures c. */
+static const struct capture *centroid_captures(struct ff_thread *t, uint32_t ps,
+                                               const struct capture *c, size_t *n,
+                                               uint32_t rays, struct err *e)
+{
+	const struct ff_job *j = t->job;
+	uint64_t seed = rng_mix(j->o.seed ^ ps);
+	double from[3], to[3], l[3], normal[3];
+
+	centroid(j->m, c->source >> 1, from);
+	centroid(j->m, ps >> 1, to);
+	v3_sub(from, to, l);
+	v3_normalise(l);
+	ff_normal(j, c->element, (int)(ps & 1), normal);
+	if (c->chain || v3_dot(l, normal) <= 0)
+		mean_direction(c, *n, l);
+	t->pairs.n = 0;
+	for (uint32_t i = 0; i < rays; i++) {
+		struct capture all = { .source = c->source, .chain = c->chain, .w = 1 };
+		line_begin(t, ps, i, seed, &all);
+		memcpy(all.l, l, sizeof l);
+		if (vec_append(&t->pairs, &all, 1, sizeof all, e))
+			return NULL;
+	}
+	*n = rays;
+	return t->pairs.data;
+}
+
 /* The G row of one link and lobe: `rays` rays, shared out among its captures in
  * proportion to their weights. (At even steps through captures of a sequence, weights
  * that alternate would be in step with them.) */
@@ -223,12 +290,10 @@ static int put_link(struct ff_thread *t, uint32_t ps, const struct capture *c, s
 {
 	const struct materials *mt = &t->job->m->material;
 	uint32_t material = model_patch_material(t->job->m, ps >> 1), row[2];
-	double mean[3] = { 0 };
+	double mean[3];
 	float direction[3];
 
-	for (size_t i = 0; i < n; i++)
-		v3_mad(mean, c[i].w, c[i].l, mean);
-	v3_normalise(mean);
+	mean_direction(c, n, mean);
 	for (int k = 0; k < 3; k++)
 		direction[k] = (float)mean[k];
 	for (int transmitted = 0; transmitted < 2; transmitted++) {
@@ -288,7 +353,7 @@ static size_t cluster_end(const struct ff_job *j, const struct capture *c, size_
 	while (end < n && c[end].chain == c[i].chain) {
 		uint32_t source = c[end].source;
 		if (source != c[i].source &&
-		    (*w >= enough || j->emits[source] || j->emits[c[i].source] ||
+		    (j->o.centroid || *w >= enough || j->emits[source] || j->emits[c[i].source] ||
 		     v3_dot(c[end].l, c[i].l) < narrow))
 			break;
 		while (end < n && c[end].chain == c[i].chain && c[end].source == source)
@@ -347,7 +412,9 @@ int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch
 		uint32_t rays = cluster_rays(j, &c[i], all > 0 ? w / all : 0, emitters);
 		size_t many = end - i;
 		const struct capture *of = &c[i];
-		if (of->chain == 0 && j->emits[of->source])
+		if (j->o.centroid)
+			of = centroid_captures(t, ps, of, &many, rays, e);
+		else if (of->chain == 0 && j->emits[of->source])
 			of = straight_captures(t, ps, of, &many, rays, e);
 		bad = !of || put_link(t, ps, of, many, rays, cast, b, e);
 		c = t->captures.data;
