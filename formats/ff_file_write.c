@@ -76,8 +76,8 @@ static int declare(struct ff_writer *w, struct err *e)
 static int put_scene(struct ff_writer *w, const struct model *m, struct err *e)
 {
 	uint8_t *sides = mem_new(m->patches, 1, "patch sides", e);
-	const uint64_t n = m->patches, n1 = n + 1, four = 4;
-	const uint64_t counts[4] = { n, m->elements, m->material.n, m->surface.n };
+	const uint64_t n = m->patches, n1 = n + 1, five = 5;
+	const uint64_t counts[5] = { n, m->elements, m->material.n, m->surface.n, m->light.n };
 
 	if (!sides)
 		return -1;
@@ -85,13 +85,14 @@ static int put_scene(struct ff_writer *w, const struct model *m, struct err *e)
 		sides[p] = model_side_modelled(m, (uint32_t)(2 * p + 1)) ? 3 : 1;
 	int failed =
 	    container_put(w->container, "patch_area", DT_F64, 1, &n, m->patch_area, e) ||
-	    container_put(w->container, "model_counts", DT_U64, 1, &four, counts, e) ||
+	    container_put(w->container, "model_counts", DT_U64, 1, &five, counts, e) ||
 	    container_put(w->container, "patch_start", DT_U32, 1, &n1, m->patch_start, e) ||
 	    container_put(w->container, "patch_surface", DT_U32, 1, &n, m->patch_surface, e) ||
 	    container_put(w->container, "patch_sides", DT_U8, 1, &n, sides, e) ||
 	    container_meta(w->container, "receivers", w->to_patches ? "patches" : "elements", e) ||
 	    cache_write_names(w->container, "materials", m->material.name, m->material.n, e) ||
-	    cache_write_names(w->container, "surfaces", m->surface.name, m->surface.n, e);
+	    cache_write_names(w->container, "surfaces", m->surface.name, m->surface.n, e) ||
+	    cache_write_names(w->container, "lights", m->light.name, m->light.n, e);
 	free(sides);
 	return failed ? -1 : 0;
 }
