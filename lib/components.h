@@ -6,7 +6,7 @@
 
 struct components {
 	uint32_t n;
-	uint32_t *of;        /* [2P] component of a patch-side */
+	uint32_t *of;        /* [2P+L] component of a patch-side or light */
 	double *emitted;     /* [n] flux, all bands, filled by the solver */
 	double *sum;         /* [n] scratch */
 };

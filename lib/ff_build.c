@@ -44,6 +44,8 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 	                  bsdf_has_lobe(mt, material, side, 1);
 	j->is_ideal[ps] = bsdf_has_ideal(mt, material, side, 0) ||
 	                  bsdf_has_ideal(mt, material, side, 1);
+	j->has_panes |= bsdf_has_ideal(mt, material, side, 1);
+	j->has_ideal |= j->is_ideal[ps];
 	j->is_source[ps] = j->shoots_diffuse[ps] || j->shoots_lobe[ps] ||
 	                   bsdf_has_lobe(mt, material, side, 0) ||
 	                   bsdf_has_lobe(mt, material, !side, 1);
@@ -204,12 +206,13 @@ static void thread_free(struct ff_thread *t)
 	free(t->formula);
 	free(t->captures.data);
 	free(t->sights.data);
+	free(t->lit.data);
 	free(t->item);
 	free(t->view);
 	free(t->chain_map.data);
 }
 
-/* ---- the loop over patches ---- */
+/* ---- the loop over patches, and then lights ---- */
 
 struct run {
 	const struct ff_job *job;
@@ -225,9 +228,11 @@ static void do_patches(void *arg, size_t begin, size_t end, int thread)
 	struct run *r = arg;
 
 	for (size_t i = begin; i < end; i++) {
-		uint32_t patch = r->first + (uint32_t)i;
+		uint32_t patch = r->first + (uint32_t)i, patches = (uint32_t)r->job->m->patches;
 		r->owner[i] = thread;
-		if (r->job->o.method == FF_HEMICUBE)
+		if (patch >= patches)
+			ff_light_row(&r->thread[thread], patch - patches, &r->batch[i], &r->err[i]);
+		else if (r->job->o.method == FF_HEMICUBE)
 			ff_patch_hemicube(&r->thread[thread], patch, &r->batch[i], &r->err[i]);
 		else
 			ff_patch_rays(&r->thread[thread], patch, &r->batch[i], &r->err[i]);
@@ -312,6 +317,7 @@ static int gather(struct ff_job *j, struct ff_stats *stats, const struct progres
 	return ff_gather(j, &stats->rays, &inner, e);
 }
 
+/* Patches [begin, end), or lights, numbered behind the patches. */
 static int all_patches(struct run *r, uint32_t begin, uint32_t end, struct chains *whole,
                        struct ff_stats *stats, const struct ff_sink *sink,
                        const struct progress *progress, struct err *e)
@@ -327,6 +333,23 @@ static int all_patches(struct run *r, uint32_t begin, uint32_t end, struct chain
 			return -1;
 	}
 	return 0;
+}
+
+/* Where the k-th of `parts` equal shares of n ends. */
+static uint32_t share(size_t n, uint32_t k, uint32_t parts)
+{
+	return (uint32_t)((uint64_t)n * k / parts);
+}
+
+static int all_lights(struct run *r, struct chains *whole, struct ff_stats *stats,
+                      const struct ff_sink *sink, struct err *e)
+{
+	const struct ff_options *o = &r->job->o;
+	size_t lights = r->job->m->light.n;
+	uint32_t patches = (uint32_t)r->job->m->patches;
+
+	return all_patches(r, patches + share(lights, o->part - 1, o->parts),
+	                   patches + share(lights, o->part, o->parts), whole, stats, sink, NULL, e);
 }
 
 /* ---- the chain table of the file ---- */
@@ -388,8 +411,8 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 	*whole = (struct ff){ .part = o->part, .parts = o->parts };
 	if (!bad && formula)
 		count_curved(&job, stats);
-	whole->patch_begin = (uint32_t)((uint64_t)m->patches * (o->part - 1) / o->parts);
-	whole->patch_end = (uint32_t)((uint64_t)m->patches * o->part / o->parts);
+	whole->patch_begin = share(m->patches, o->part - 1, o->parts);
+	whole->patch_end = share(m->patches, o->part, o->parts);
 	run.thread = mem_new((size_t)threads, sizeof *run.thread, "threads", e);
 	run.batch = mem_new(PATCHES_AT_A_TIME, sizeof *run.batch, "batches", e);
 	run.owner = mem_new(PATCHES_AT_A_TIME, sizeof *run.owner, "batches", e);
@@ -402,12 +425,12 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 	for (size_t i = 0; !bad && i < PATCHES_AT_A_TIME; i++)
 		run.batch[i].f64 = o->f64;
 	if (matrix)
-		bad = bad || ff_matrix(&job, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
-		      put_chains(whole, &chains, e);
+		bad = bad || ff_matrix(&job, whole->patch_begin, whole->patch_end, sink, stats, progress, e);
 	else
 		bad = bad || gather(&job, stats, progress, e) ||
 		      all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats,
-	                         sink, progress, e) || put_chains(whole, &chains, e);
+	                         sink, progress, e);
+	bad = bad || all_lights(&run, &chains, stats, sink, e) || put_chains(whole, &chains, e);
 	for (int t = 0; run.thread && t < threads; t++) {
 		stats->rays += run.thread[t].rays;
 		if (run.thread[t].formula)

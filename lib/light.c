@@ -36,7 +36,7 @@ static void faces(const struct lights *l, const double direction[3], double area
 
 static double unit_flux(const struct lights *l, size_t light)
 {
-	double inner = cos(l->cone[2 * light]), outer = cos(l->cone[2 * light + 1]), area[3];
+	double inner = l->cosine[2 * light], outer = l->cosine[2 * light + 1], area[3];
 
 	switch (l->kind[light]) {
 	case LIGHT_POINT:
@@ -55,14 +55,20 @@ int lights_derive(struct model *m, struct err *e)
 
 	find_box(m);
 	l->unit_flux = mem_new(l->n, sizeof *l->unit_flux, "lights", e);
-	for (size_t i = 0; l->unit_flux && i < l->n; i++)
+	l->cosine = mem_new(l->n, 2 * sizeof *l->cosine, "lights", e);
+	if (!l->unit_flux || !l->cosine)
+		return -1;
+	for (size_t i = 0; i < 2 * l->n; i++)
+		l->cosine[i] = cos(l->cone[i]);
+	for (size_t i = 0; i < l->n; i++)
 		l->unit_flux[i] = unit_flux(l, i);
-	return l->unit_flux ? 0 : -1;
+	return 0;
 }
 
-double light_falloff(const struct lights *l, size_t light, double cos_axis)
+/* The extension's intensity between a spot's cones. */
+static double falloff(const struct lights *l, size_t light, double cos_axis)
 {
-	double inner = cos(l->cone[2 * light]), outer = cos(l->cone[2 * light + 1]);
+	double inner = l->cosine[2 * light], outer = l->cosine[2 * light + 1];
 
 	if (l->kind[light] != LIGHT_SPOT || cos_axis >= inner)
 		return 1;
@@ -89,22 +95,22 @@ void light_see(const struct lights *l, size_t light, const double x[3], double c
 		for (int k = 0; k < 3; k++)
 			s->toward[k] = -direction[k];
 		v3_mad(x, diagonal(l) + clear, s->toward, s->to);
-		s->irradiance = 1;
+		s->across = s->falloff = 1;
 		return;
 	}
 	v3_sub(&l->position[3 * light], x, s->toward);
 	double distance = v3_normalise(s->toward);
 	v3_mad(&l->position[3 * light], -clear, s->toward, s->to);
 	/* Closer than rays can tell, a light is inside the surface. */
-	s->irradiance = distance > clear
-		? light_falloff(l, light, -v3_dot(direction, s->toward)) / (distance * distance) : 0;
+	s->across = distance > clear ? 1 / (distance * distance) : 0;
+	s->falloff = falloff(l, light, -v3_dot(direction, s->toward));
 }
 
 /* Cosine of a spot's ray to its axis: uniform within the inner cone; between the cones the
  * flux grows as the third power. */
 static double spot_cosine(const struct lights *l, size_t light, double u)
 {
-	double inner = cos(l->cone[2 * light]), outer = cos(l->cone[2 * light + 1]);
+	double inner = l->cosine[2 * light], outer = l->cosine[2 * light + 1];
 	double core = 1 - inner, rim = (inner - outer) / 3, at = u * (core + rim);
 
 	if (at < core)

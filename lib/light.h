@@ -15,7 +15,8 @@
 struct light_sight {
 	double toward[3];    /* unit vector to the light */
 	double to[3];        /* a shadow ray's end: just before the light, or beyond the scene */
-	double irradiance;   /* across the rays, of intensity 1; 0 outside a spot's cone */
+	double across;       /* irradiance across the rays on the axis, of intensity 1 */
+	double falloff;      /* of the direction: 0 outside a spot's cone, else up to 1 */
 };
 
 /* Fills unit_flux and box: the flux of a point is 4 pi, that of a spot
@@ -24,11 +25,8 @@ struct light_sight {
  * O(triangles + lights). 0, or -1 and e. */
 int lights_derive(struct model *m, struct err *e);
 
-/* Intensity in a direction at an angle to a spot's axis, over that along the axis: the
- * extension's ((cos - cos outer) / (cos inner - cos outer))^2 between its cones. */
-double light_falloff(const struct lights *l, size_t light, double cos_axis);
-
-/* How a point sees a light, if nothing is between; `clear` is how far before the light a
+/* How a point sees a light, if nothing is between; the falloff between a spot's cones is
+ * the extension's ((cos - cos outer) / (cos inner - cos outer))^2; `clear` is how far before the light a
  * ray ends (ray_offset). */
 void light_see(const struct lights *l, size_t light, const double x[3], double clear,
                struct light_sight *s);

@@ -115,6 +115,7 @@ void lights_free(struct lights *l)
 	free(l->cone);
 	free(l->intensity);
 	free(l->unit_flux);
+	free(l->cosine);
 	*l = (struct lights){ 0 };
 }
 

@@ -51,6 +51,7 @@ struct lights {
 	double *intensity;        /* [n][bands] cd along the axis; lx, of a plane across
 	                             the light, for directional ones */
 	double *unit_flux;        /* derived, [n] flux of intensity 1 */
+	double *cosine;           /* derived, [n][2] of the cones */
 	double box[2][3];         /* derived: the least and largest coordinates of triangles */
 };
 

@@ -6,6 +6,7 @@
 
 #include "bsdf.h"
 #include "components.h"
+#include "light.h"
 #include "mem.h"
 #include "send.h"
 
@@ -17,18 +18,31 @@ static int solution_arrays(struct solution *s, const struct model *m,
 	size_t bands = (size_t)m->bands, es = 2 * m->elements, ps = 2 * m->patches;
 
 	*s = (struct solution){ .groups = 1, .element_sides = es, .bands = m->bands,
-	                        .patch_sides = ps, .links = t->links, .rows = t->rows };
+	                        .patch_sides = ps, .sources = model_sources(m),
+	                        .links = t->links, .rows = t->rows };
 	s->direct = mem_new(es, bands * sizeof(double), "irradiance", e);
 	s->caustic = mem_new(es, bands * sizeof(double), "irradiance", e);
 	s->indirect = mem_new(es, bands * sizeof(double), "irradiance", e);
 	s->error = mem_new(es, bands * sizeof(double), "irradiance", e);
-	s->unshot_emission = mem_new(ps, bands * sizeof(double), "unshot flux", e);
+	s->unshot_emission = mem_new(s->sources, bands * sizeof(double), "unshot flux", e);
 	s->unshot_diffuse = mem_new(ps, bands * sizeof(double), "unshot flux", e);
 	s->unshot_link = mem_new(t->links, 2 * bands * sizeof(double), "unshot flux", e);
 	s->shot = mem_new(t->rows, 2 * bands * sizeof(double), "shot flux", e);
 	s->ledger = mem_new(LEDGER_TERMS, bands * sizeof(double), "ledger", e);
 	return s->direct && s->caustic && s->indirect && s->error && s->unshot_emission &&
 	       s->unshot_diffuse && s->unshot_link && s->shot && s->ledger ? 0 : -1;
+}
+
+/* Flux that a source emits. */
+static double emitted_by(const struct model *m, uint32_t source, int band)
+{
+	if (source >= 2 * m->patches)
+		return light_flux(m, source - 2 * m->patches, band);
+	if (!model_side_modelled(m, source))
+		return 0;
+	return m->patch_area[source >> 1] *
+	       bsdf_exitance(&m->material, model_patch_material(m, source >> 1),
+	                     (int)(source & 1), band);
 }
 
 int solution_begin(struct solution *s, const struct model *m, const struct transport *t,
@@ -38,21 +52,17 @@ int solution_begin(struct solution *s, const struct model *m, const struct trans
 
 	if (solution_arrays(s, m, t, e))
 		return -1;
-	for (uint32_t i = 0; i < 2 * m->patches; i++) {
-		if (!model_side_modelled(m, i))
-			continue;
+	for (uint32_t i = 0; i < s->sources; i++)
 		for (int k = 0; k < m->bands; k++) {
-			double flux = m->patch_area[i >> 1] *
-			              bsdf_exitance(&m->material, model_patch_material(m, i >> 1),
-			                            (int)(i & 1), k);
+			double flux = emitted_by(m, i, k);
 			s->unshot_emission[i * (size_t)m->bands + (size_t)k] = flux;
 			s->ledger[LEDGER_EMITTED * m->bands + k] += flux;
 			all += flux;
 		}
-	}
 	if (!(all > 0))
 		return err_set(e, "no emitter: nothing in this scene gives light; give a material "
-		               "emission (glTF emissiveFactor, or emission_front in its extras)");
+		               "emission (glTF emissiveFactor, or emission_front in its extras) or "
+		               "add a light (KHR_lights_punctual)");
 	if (!isfinite(all))
 		return err_set(e, "the emitted flux is not a finite number");
 	return 0;
@@ -65,7 +75,7 @@ struct solver {
 	const struct transport *t;
 	struct sender sender;
 	struct components parts;
-	double *weight;          /* [2P] 1 / flux emitted in the side's component */
+	double *weight;          /* [2P+L] 1 / flux emitted in the source's component */
 	double *priority;        /* [2P] unshot flux by weight when the round began */
 	double *links;           /* [2P] unshot flux of a side's links then, all bands */
 	lanes unshot[GROUPS_MAX];/* in all, then */
@@ -205,10 +215,10 @@ static void book(struct solver *v, const struct sent *sent, const double *out)
 	}
 }
 
-static void take_emission(struct solver *v, uint32_t ps, lanes *to, lanes *out)
+static void take_emission(struct solver *v, uint32_t source, lanes *to, lanes *out)
 {
 	size_t bands = (size_t)v->s->bands;
-	double *from = v->s->unshot_emission + ps * bands;
+	double *from = v->s->unshot_emission + source * bands;
 
 	memset(to, 0, v->sender.groups * sizeof *to);
 	memcpy(to, from, bands * sizeof *from);
@@ -238,6 +248,17 @@ static void shoot_side(struct solver *v, uint32_t ps)
 	v->s->shots++;
 }
 
+static void shoot_light(struct solver *v, uint32_t source)
+{
+	struct sent sent = { 0 };
+	lanes emission[GROUPS_MAX], out[GROUPS_MAX] = { { 0 } };
+
+	take_emission(v, source, emission, out);
+	shoot_row(v, v->t->light_row[source - v->s->patch_sides], FRESH, emission, NULL, &sent);
+	book(v, &sent, (const double *)out);
+	v->s->shots++;
+}
+
 /* ---- rounds ---- */
 
 static void check_ledger(struct solver *v)
@@ -254,14 +275,22 @@ static void check_ledger(struct solver *v)
 	}
 }
 
+/* A source's emission by band is added to v->unshot; its sum. */
+static double survey_emission(struct solver *v, uint32_t source)
+{
+	const double *emission = v->s->unshot_emission + source * (size_t)v->s->bands;
+
+	for (int k = 0; k < v->s->bands; k++)
+		((double *)v->unshot)[k] += emission[k];
+	return total(emission, (size_t)v->s->bands);
+}
+
 /* Unshot flux of a side by band is added to v->unshot, that of its links kept. */
 static void survey_side(struct solver *v, uint32_t ps)
 {
 	const struct sender *s = &v->sender;
-	const double *emission = v->s->unshot_emission + ps * (size_t)s->bands;
 
-	for (int k = 0; k < s->bands; k++)
-		((double *)v->unshot)[k] += emission[k];
+	survey_emission(v, ps);
 	v->links[ps] = s->link_gain[ps] = 0;
 	for (size_t g = 0; g < s->groups; g++) {
 		lanes x = link_unshot(v, ps, g);
@@ -285,6 +314,8 @@ static double survey(struct solver *v, double *worst)
 		c->sum[c->of[ps]] += v->priority[ps];
 		top = fmax(top, v->priority[ps]);
 	}
+	for (uint32_t i = (uint32_t)v->s->patch_sides; i < v->s->sources; i++)
+		c->sum[c->of[i]] += survey_emission(v, i) * v->weight[i];
 	*worst = 0;
 	for (uint32_t i = 0; i < c->n; i++)
 		*worst = fmax(*worst, c->sum[i]);
@@ -305,6 +336,23 @@ static int is_due(const struct solver *v, uint32_t ps)
 		return 0;
 	double p = all_unshot(v, ps) * v->weight[ps];
 	return p > 0 && p >= least;
+}
+
+/* Lights come before the first round, whatever they are worth: they shoot once. 0 when
+ * max_shots stopped it. */
+static int shoot_lights(struct solver *v, uint64_t last_shot)
+{
+	struct solution *s = v->s;
+	size_t bands = (size_t)s->bands;
+
+	for (uint32_t i = (uint32_t)s->patch_sides; i < s->sources; i++) {
+		if (!(total(s->unshot_emission + i * bands, bands) > 0))
+			continue;
+		if (s->shots >= last_shot)
+			return 0;
+		shoot_light(v, i);
+	}
+	return 1;
 }
 
 /* Shoots the rest of the current round; 0 when max_shots stopped it. */
@@ -330,8 +378,10 @@ static void rounds(struct solver *v, const struct radiosity_options *o,
 {
 	struct solution *s = v->s;
 	uint64_t last = o->max_shots > UINT64_MAX - s->shots ? UINT64_MAX : s->shots + o->max_shots;
+	int whole = shoot_lights(v, last);
 	double top = survey(v, &r->unshot);
-	int whole = 1;
+
+	check_ledger(v);
 
 	while (whole && (r->unshot > o->stop || s->round[0] != 0)) {
 		if (s->round[0] == 0)
@@ -351,21 +401,18 @@ static int solver_init(struct solver *v, struct solution *s, const struct transp
                        struct err *e)
 {
 	*v = (struct solver){ .s = s, .t = t };
-	v->weight = mem_new(s->patch_sides, sizeof *v->weight, "priorities", e);
+	v->weight = mem_new(s->sources, sizeof *v->weight, "priorities", e);
 	v->priority = mem_new(s->patch_sides, sizeof *v->priority, "priorities", e);
 	v->links = mem_new(s->patch_sides, sizeof *v->links, "priorities", e);
 	if (!v->weight || !v->priority || !v->links || sender_init(&v->sender, t, e) || sender_load(&v->sender, s, e) ||
 	    components_init(&v->parts, t, e))
 		return -1;
-	for (uint32_t ps = 0; ps < s->patch_sides; ps++)
+	for (uint32_t i = 0; i < s->sources; i++)
 		for (int k = 0; k < s->bands; k++)
-			v->parts.emitted[v->parts.of[ps]] += t->m->patch_area[ps >> 1] *
-				(model_side_modelled(t->m, ps)
-				 ? bsdf_exitance(&t->m->material, model_patch_material(t->m, ps >> 1),
-				                 (int)(ps & 1), k) : 0);
-	for (uint32_t ps = 0; ps < s->patch_sides; ps++) {
-		double emitted = v->parts.emitted[v->parts.of[ps]];
-		v->weight[ps] = emitted > 0 ? 1 / emitted : 0;
+			v->parts.emitted[v->parts.of[i]] += emitted_by(t->m, i, k);
+	for (uint32_t i = 0; i < s->sources; i++) {
+		double emitted = v->parts.emitted[v->parts.of[i]];
+		v->weight[i] = emitted > 0 ? 1 / emitted : 0;
 	}
 	return 0;
 }

@@ -34,13 +34,14 @@ int solution_check(const struct model *m, const struct solution *s, struct err *
 	size_t bands = (size_t)s->bands, sides = s->element_sides * bands;
 
 	if (s->bands != m->bands || s->element_sides != 2 * m->elements ||
-	    s->patch_sides != 2 * m->patches || s->groups < 1)
+	    s->patch_sides != 2 * m->patches || s->sources != model_sources(m) ||
+	    s->groups < 1)
 		return err_set(e, "array irradiance_direct: it is not that of the model's elements");
 	return check_numbers("irradiance_direct", s->direct, s->groups * sides, 0, e) ||
 	       check_numbers("irradiance_caustic", s->caustic, s->groups * sides, 0, e) ||
 	       check_numbers("irradiance_indirect", s->indirect, s->groups * sides, 0, e) ||
 	       check_numbers("irradiance_error", s->error, sides, 0, e) ||
-	       check_numbers("unshot_emission", s->unshot_emission, s->patch_sides * bands, 1,
+	       check_numbers("unshot_emission", s->unshot_emission, s->sources * bands, 1,
 	                     e) ||
 	       check_numbers("unshot_diffuse", s->unshot_diffuse, s->patch_sides * bands, 1,
 	                     e) ||

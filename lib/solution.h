@@ -21,9 +21,10 @@ struct solution {
 	/* The solver's state, for shoot --resume: what is still to be shot, what each
 	 * row has sent so far, where the rest went. */
 	size_t patch_sides;        /* 2 P */
+	size_t sources;            /* 2 P + L, punctual lights behind patch-sides */
 	size_t links;              /* of all shards, in the solver's order */
 	size_t rows;               /* of all shards, in order */
-	double *unshot_emission;   /* [2P][bands] flux not yet sent by emitters */
+	double *unshot_emission;   /* [2P+L][bands] flux not yet sent by emitters */
 	double *unshot_diffuse;    /* [2P][bands] flux to leave diffusely */
 	double *unshot_link;       /* [links][2][bands] flux to leave by the lobes of a
 	                              link's target: first what has met only emitters,

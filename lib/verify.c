@@ -216,8 +216,10 @@ static double unshot(const struct solution *s, size_t band)
 	const size_t bands = (size_t)s->bands;
 	double sum = 0;
 
+	for (size_t i = 0; i < s->sources; i++)
+		sum += s->unshot_emission[i * bands + band];
 	for (size_t i = 0; i < s->patch_sides; i++)
-		sum += s->unshot_emission[i * bands + band] + s->unshot_diffuse[i * bands + band];
+		sum += s->unshot_diffuse[i * bands + band];
 	for (size_t i = 0; i < 2 * s->links; i++)
 		sum += s->unshot_link[i * bands + band];
 	return sum;

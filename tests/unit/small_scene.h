@@ -144,10 +144,10 @@ static inline void small_solution(struct solution *s, const struct model *m)
 	const size_t bands = (size_t)m->bands, sides = 2 * m->elements, patch_sides = 2 * m->patches;
 
 	*s = (struct solution){ .groups = 1, .element_sides = sides, .bands = m->bands,
-		.patch_sides = patch_sides, .links = 1, .shots = 42,
+		.patch_sides = patch_sides, .sources = patch_sides + m->light.n, .links = 1, .shots = 42,
 		.direct = ramp(sides * bands, .5), .caustic = ramp(sides * bands, .25),
 		.indirect = ramp(sides * bands, .125), .error = ramp(sides * bands, .01),
-		.unshot_emission = ramp(patch_sides * bands, 0),
+		.unshot_emission = ramp((patch_sides + m->light.n) * bands, 0),
 		.unshot_diffuse = ramp(patch_sides * bands, 1e-3),
 		.unshot_link = ramp(2 * bands, 1e-3),
 		.ledger = ramp(LEDGER_TERMS * bands, 0) };
