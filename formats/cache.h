@@ -7,12 +7,12 @@
 #include "container.h"
 
 #define CACHE_VERSION "2"    /* of .mesh and .rad files */
-#define CACHE_FF_VERSION "3" /* of .ff files */
+#define CACHE_FF_VERSION "4" /* of .ff files */
 
 /* Part of the key of each stage's output. To be raised whenever a stage makes something
  * else of the same input and options, so that what older programs left is made anew. */
 #define REVISION_MESH "3"
-#define REVISION_FF "3"
+#define REVISION_FF "4"
 #define REVISION_RAD "4"
 #define REVISION_VIEW "1"
 

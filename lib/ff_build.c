@@ -244,14 +244,14 @@ void ff_count(struct ff_stats *s, const struct ff *f)
 	for (size_t r = 0; r < f->rows; r++) {
 		double cut = 0;
 		s->rows[f->row_kind[r]]++;
-		s->worst_residual = fmax(s->worst_residual, fabs(f->row_residual[r]));
+		s->worst_residual = fmax(s->worst_residual, fabs((double)f->row_residual[r]));
 		for (uint64_t b = f->row_block[r]; b < f->row_block[r + 1]; b++)
 			cut += f->block_cut[b] * f->row_scale[r];
 		s->cut = fmax(s->cut, cut);
 		if (f->row_kind[r] == FF_DIFFUSE) {
 			s->samples += f->row_samples[r];
-			s->mean_error += f->row_error[r];
-			s->worst_error = fmax(s->worst_error, f->row_error[r]);
+			s->mean_error += (double)f->row_error[r];
+			s->worst_error = fmax(s->worst_error, (double)f->row_error[r]);
 		}
 	}
 	s->links += f->links;

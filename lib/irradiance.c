@@ -76,11 +76,13 @@ static ALWAYS_INLINE void add_list(const struct gather *g, const struct feed *x,
                                    int f32, int fresh, int mixed)
 {
 	const struct ff *f = x->f;
-	const uint32_t *column = f->column + p.word;
 	const uint64_t n = f->block_start[x->block + 1] - p.entry;
 
-	for (uint64_t i = 0; i < n && column[i] >> 1 < below; i++) {
-		size_t at = (column[i] >> 1) + (column[i] & 1 ? g->receivers : 0);
+	for (uint64_t i = 0; i < n; i++) {
+		uint32_t column = ff_word(f, p.word + i);
+		if (column >> 1 >= below)
+			break;
+		size_t at = (column >> 1) + (column & 1 ? g->receivers : 0);
 		double v = f32 ? (double)f->value[p.entry + i] : f->value64[p.entry + i];
 		add(x, to, at, v, fresh, mixed);
 	}
@@ -91,15 +93,16 @@ static ALWAYS_INLINE void add_spans(const struct gather *g, const struct feed *x
                                     int f32, int fresh, int mixed)
 {
 	const struct ff *f = x->f;
-	const uint64_t end = ff_block_column(f)[x->block + 1];
+	const uint64_t end = f->block_start[x->block + 1];
 
-	for (; p.word < end; p.word += 2, p.done = 0) {
-		uint32_t first = (f->column[p.word] >> 1) + p.done;
-		uint32_t last = first + f->column[p.word + 1] - p.done;
-		size_t back = f->column[p.word] & 1 ? g->receivers : 0;
+	for (int cut = 0; p.entry < end && !cut; p.word += 2, p.done = 0) {
+		uint32_t column = ff_word(f, p.word), first = (column >> 1) + p.done;
+		uint32_t last = first + ff_word(f, p.word + 1) - p.done;
+		size_t back = column & 1 ? g->receivers : 0;
 		if (first >= below)
 			break;
-		if (last > below)
+		cut = last > below;
+		if (cut)
 			last = below;
 		for (size_t at = first + back; at < last + back; at++, p.entry++) {
 			double v = f32 ? (double)f->value[p.entry] : f->value64[p.entry];
@@ -136,10 +139,10 @@ static void add_feed(const struct gather *g, const struct feed *x, struct place 
 static void seek_span(const struct feed *x, uint32_t receiver, struct place *p)
 {
 	const struct ff *f = x->f;
-	const uint64_t end = ff_block_column(f)[x->block + 1];
+	const uint64_t end = f->block_start[x->block + 1];
 
-	for (; p->word < end; p->word += 2) {
-		uint32_t first = f->column[p->word] >> 1, count = f->column[p->word + 1];
+	for (; p->entry < end; p->word += 2) {
+		uint32_t first = ff_word(f, p->word) >> 1, count = ff_word(f, p->word + 1);
 		if (first >= receiver)
 			return;
 		p->done = receiver - first < count ? receiver - first : 0;
@@ -152,12 +155,11 @@ static void seek_span(const struct feed *x, uint32_t receiver, struct place *p)
 /* Ranges are whole patches: both sides of a patch are on one side of a bound. */
 static void seek_word(const struct feed *x, uint32_t receiver, struct place *p)
 {
-	const uint32_t *word = x->f->column + p->word;
-	uint64_t n = ff_block_column(x->f)[x->block + 1] - p->word, at = 0;
+	uint64_t n = x->f->block_start[x->block + 1] - p->entry, at = 0;
 
 	while (n) {
 		uint64_t half = n / 2;
-		int below = word[at + half] >> 1 < receiver;
+		int below = ff_word(x->f, p->word + at + half) >> 1 < receiver;
 		at += below ? half + 1 : 0;
 		n = below ? n - half - 1 : half;
 	}
@@ -169,13 +171,13 @@ static void seek_word(const struct feed *x, uint32_t receiver, struct place *p)
 static struct place find_place(const struct feed *x, uint32_t receiver)
 {
 	const struct ff *f = x->f;
-	struct place p = { ff_block_column(f)[x->block], f->block_start[x->block], 0 };
+	struct place p = { ff_first_word(f, x->block), f->block_start[x->block], 0 };
 
 	if (receiver && ff_has_spans(f, x->block))
 		seek_span(x, receiver, &p);
 	else if (receiver)
 		seek_word(x, receiver, &p);
-	__builtin_prefetch(f->column + p.word);
+	__builtin_prefetch(f->column16 ? (const void *)(f->column16 + p.word) : f->column + p.word);
 	__builtin_prefetch(f->value ? (const void *)(f->value + p.entry) : f->value64 + p.entry);
 	return p;
 }
@@ -297,18 +299,18 @@ static void put_bands(void *arg, size_t begin, size_t end, int thread)
 	}
 }
 
-/* Bytes of the columns and values that are read. */
+/* Bytes of the values that are read and, where columns are lists, of these. */
 static double bytes_of(const struct gather *g)
 {
 	double bytes = 0;
 
 	for (size_t i = 0; i < g->feeds; i++) {
 		const struct ff *f = g->feed[i].f;
-		const uint64_t *word = ff_block_column(f) + g->feed[i].block;
 		const uint64_t *entry = f->block_start + g->feed[i].block;
-		bytes += (double)(word[1] - word[0]) * sizeof *f->column +
-		         (double)(entry[1] - entry[0]) *
-		         (f->value ? sizeof *f->value : sizeof *f->value64);
+		size_t word = f->column16 ? sizeof *f->column16 : sizeof *f->column;
+		size_t value = f->value ? sizeof *f->value : sizeof *f->value64;
+		bytes += (double)(entry[1] - entry[0]) *
+		         (double)(value + (ff_has_spans(f, g->feed[i].block) ? 0 : word));
 	}
 	return bytes;
 }

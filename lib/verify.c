@@ -106,7 +106,7 @@ static double area(const struct pairs *p, size_t i)
  * what float32 values leave. */
 static double variance(const struct pairs *p, size_t i, double flow)
 {
-	double error = area(p, i) * p->pm.f->row_error[p->pm.row[i]], rounding = 1e-6 * flow;
+	double error = area(p, i) * (double)p->pm.f->row_error[p->pm.row[i]], rounding = 1e-6 * flow;
 
 	return error * error + rounding * rounding;
 }
@@ -181,7 +181,7 @@ static double worst_closure(const struct ff *f, double *residual)
 		for (uint64_t k = f->block_start[b]; k < f->block_start[b + 1]; k++)
 			sum += ff_value(f, k);
 		worst = fmax(worst, fabs(1 - f->row_scale[r] * sum));
-		*residual = fmax(*residual, fabs(f->row_residual[r]));
+		*residual = fmax(*residual, fabs((double)f->row_residual[r]));
 	}
 	return worst;
 }

@@ -47,6 +47,39 @@ assert worst <= 4e-15, f"reciprocity is off by {worst}"
 END
 check "reciprocal to rounding" "$PYTHON" "$T/reciprocal.py" "$T/a.mesh" "$T/one.ff" "$T/0.csv"
 
+# What a factor costs in the file: 4 bytes are its value.
+cat >"$T/bytes.py" <<'END'
+import os, sys
+from chain import container
+cost = os.path.getsize(sys.argv[1]) / container(sys.argv[1])[1]["value"].size
+print(f"{cost:.3f} bytes a factor")
+assert cost <= float(sys.argv[2])
+END
+costs() {
+	prepare "$PYTHON" "$top/tests/bench/ff_scenes.py" "$1" "$T/c.gltf"
+	prepare mesh -p inf -e inf "$T/c.gltf" -o "$T/c.mesh"
+	prepare ffcalc --to patches -t "$3" "$T/c.mesh" -o "$T/c.ff"
+	check "$1: at most $2 bytes a factor" "$PYTHON" "$T/bytes.py" "$T/c.ff" "$2"
+	check "$1: rows close, factors are reciprocal" inspect --verify "$T/c.ff"
+}
+costs cube12 4.2 1e-6
+costs city100 8 1e-4
+
+# A row of spans that others share, as inspect and the program in ff(5) read it.
+prepare "$PYTHON" "$top/tests/bench/ff_scenes.py" cube6 "$T/c.gltf"
+prepare mesh -p inf -e inf "$T/c.gltf" -o "$T/c.mesh"
+prepare ffcalc --to patches "$T/c.mesh" -o "$T/c.ff"
+for row in 0 100 215; do
+	check "row $row: what the reader of ff(5) prints" sh -c "
+	inspect --npy patch-matrix '$T/c.ff' >'$T/c.npy'
+	$PYTHON '$top/tests/read_row.py' '$T/c.ff' $row >'$T/read' && $PYTHON -c '
+import sys, numpy as np
+lines = [line.split() for line in open(sys.argv[1])]
+row = np.zeros(216)
+row[[int(line[1]) for line in lines]] = [float(line[3]) for line in lines]
+assert len(lines) == 180 and (row == np.load(sys.argv[2])[$row, :216]).all()' '$T/read' '$T/c.npy'"
+done
+
 # says SCENE OPTIONS PATTERN NAME: the report has a line like the pattern.
 says() {
 	prepare mesh "$scenes/$1.gltf" -o "$T/b.mesh" -p 25% -e 25%

@@ -8,7 +8,7 @@
 rows_close() {
 	$PYTHON -c '
 import sys, chain, numpy as np
-_, a = chain.container(sys.argv[1])
+_, a = chain.form_factors(sys.argv[1])
 first = a["row_block"][:-1].astype(int)
 start = a["block_start"].astype(int)
 values = a["value"] if "value" in a else a["value64"]

@@ -127,7 +127,7 @@ static inline void small_ff(struct ff *f)
 	const uint8_t kind[] = { FF_DIFFUSE, FF_DIFFUSE, FF_DIFFUSE, FF_REFLECTED };
 	const float value[] = { .25f, .25f, .125f, .125f, .125f, .125f, .5f }, up[] = { 0, 0, 1 };
 	const double scale[] = { 1, 1, 1, 2 }, none[] = { 0, 0, 0, 0, 0 };
-	const double error[] = { .01, 0, .02, 0 }, residual[] = { 1e-7, 0, 0, 0 };
+	const float error[] = { .01f, 0, .02f, 0 }, residual[] = { 1e-7f, 0, 0, 0 };
 	const double escape[] = { .375, 0, 1, .5, 0 }, black[] = { .125, .125, 0, .125, 0 };
 	const uint32_t target[] = { 0 }, source[] = { 2 }, chain[] = { 0 }, rows[] = { 3, FF_NO_ROW };
 
