@@ -160,7 +160,10 @@ static inline void small_solution(struct solution *s, const struct model *m)
 {
 	const size_t bands = (size_t)m->bands, sides = 2 * m->elements, patch_sides = 2 * m->patches;
 
-	*s = (struct solution){ .groups = 1, .element_sides = sides, .bands = m->bands,
+	*s = (struct solution){ .groups = 1, .emitters = m->material.n + m->light.n,
+		.emitter_group = calloc(m->material.n + m->light.n, sizeof *s->emitter_group),
+		.group_name = calloc(1, sizeof *s->group_name),
+		.element_sides = sides, .bands = m->bands,
 		.patch_sides = patch_sides, .sources = patch_sides + m->light.n, .links = 1, .shots = 42,
 		.direct = ramp(sides * bands, .5), .caustic = ramp(sides * bands, .25),
 		.indirect = ramp(sides * bands, .125), .error = ramp(sides * bands, .01),
@@ -169,6 +172,7 @@ static inline void small_solution(struct solution *s, const struct model *m)
 		.unshot_diffuse = ramp(patch_sides * bands, 1e-3),
 		.unshot_link = ramp(2 * bands, 1e-3),
 		.ledger = ramp(LEDGER_TERMS * bands, 0) };
+	s->group_name[0] = strdup("all");
 	for (size_t b = 0; b < bands; b++) {
 		double unshot = 0;
 		for (size_t i = 0; i < patch_sides; i++)
