@@ -206,6 +206,11 @@ static void cast_one(struct ff_thread *t, const struct capture *c, int side, int
 		cast(t, c, out, dir, w);
 }
 
+static int is_light(const struct ff_job *j, uint32_t source)
+{
+	return source >= 2 * j->m->patches;
+}
+
 static void centroid(const struct model *m, uint32_t patch, double c[3])
 {
 	memset(c, 0, 3 * sizeof *c);
@@ -224,8 +229,8 @@ static void mean_direction(const struct capture *c, size_t n, double mean[3])
 }
 
 /* Captures as the paper has them: light comes from the source's centroid to that of the
- * patch, all over which it is alike. By a mirror, or from a source of which the patch sees a
- * part that its centroid is not in, it comes from the mean of the captures c. */
+ * patch, all over which it is alike. By a mirror, from a punctual light, or from a source
+ * whose centroid is below the horizon, it comes from the mean of the captures c. */
 static const struct capture *centroid_captures(struct ff_thread *t, uint32_t ps,
                                                const struct capture *c, size_t *n,
                                                uint32_t rays, struct err *e)
@@ -234,13 +239,16 @@ static const struct capture *centroid_captures(struct ff_thread *t, uint32_t ps,
 	uint64_t seed = rng_mix(j->o.seed ^ ps);
 	double from[3], to[3], l[3], normal[3];
 
-	centroid(j->m, c->source >> 1, from);
-	centroid(j->m, ps >> 1, to);
-	v3_sub(from, to, l);
+	mean_direction(c, *n, l);
+	if (c->chain == 0 && !is_light(j, c->source)) {
+		centroid(j->m, c->source >> 1, from);
+		centroid(j->m, ps >> 1, to);
+		v3_sub(from, to, from);
+		ff_normal(j, c->element, (int)(ps & 1), normal);
+		if (v3_dot(from, normal) > 0)
+			memcpy(l, from, sizeof l);
+	}
 	v3_normalise(l);
-	ff_normal(j, c->element, (int)(ps & 1), normal);
-	if (c->chain || v3_dot(l, normal) <= 0)
-		mean_direction(c, *n, l);
 	t->pairs.n = 0;
 	for (uint32_t i = 0; i < rays; i++) {
 		struct capture all = { .source = c->source, .chain = c->chain, .w = 1 };
@@ -353,7 +361,8 @@ static size_t cluster_end(const struct ff_job *j, const struct capture *c, size_
 	while (end < n && c[end].chain == c[i].chain) {
 		uint32_t source = c[end].source;
 		if (source != c[i].source &&
-		    (j->o.centroid || *w >= enough || j->emits[source] || j->emits[c[i].source] ||
+		    (j->o.centroid || *w >= enough || ff_emits(j, source) ||
+		     ff_emits(j, c[i].source) ||
 		     v3_dot(c[end].l, c[i].l) < narrow))
 			break;
 		while (end < n && c[end].chain == c[i].chain && c[end].source == source)
@@ -367,7 +376,7 @@ static size_t cluster_end(const struct ff_job *j, const struct capture *c, size_
 static uint32_t cluster_rays(const struct ff_job *j, const struct capture *c, double share,
                              size_t emitters)
 {
-	double rays = j->emits[c->source]
+	double rays = ff_emits(j, c->source)
 	            ? (double)j->o.lobe_rays * j->o.emitter_gain / (double)emitters
 	            : fmin(1, share) * j->o.lobe_rays;
 
@@ -380,7 +389,7 @@ static size_t count_emitters(const struct ff_job *j, const struct capture *c, si
 	size_t emitters = 0;
 
 	for (size_t i = 0; i < n; i++)
-		emitters += j->emits[c[i].source] &&
+		emitters += (size_t)ff_emits(j, c[i].source) &&
 		            (i == 0 || c[i].source != c[i - 1].source || c[i].chain != c[i - 1].chain);
 	return emitters;
 }
@@ -401,7 +410,8 @@ int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch
 		if (c[i].chain == 0)
 			met[c[i].source] = 1;
 	}
-	bad = bad || probe_unseen(t, ps, met, e) || sort_captures(t, e);
+	bad = bad || probe_unseen(t, ps, met, e) || ff_light_captures(t, ps, e) ||
+	      sort_captures(t, e);
 	free(met);
 	c = t->captures.data;
 	if (!bad)
@@ -414,7 +424,7 @@ int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch
 		const struct capture *of = &c[i];
 		if (j->o.centroid)
 			of = centroid_captures(t, ps, of, &many, rays, e);
-		else if (of->chain == 0 && j->emits[of->source])
+		else if (of->chain == 0 && !is_light(j, of->source) && j->emits[of->source])
 			of = straight_captures(t, ps, of, &many, rays, e);
 		bad = !of || put_link(t, ps, of, many, rays, cast, b, e);
 		c = t->captures.data;
