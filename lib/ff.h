@@ -2,16 +2,20 @@
  *
  * A ROW is a distribution of flux leaving one patch-side: where it first lands,
  * and where it lands after each chain of ideal mirrors and clear panes.
- * Patch-side = 2 patch + side, element-side = 2 element + side.
+ * Patch-side = 2 patch + side, element-side = 2 element + side. A punctual light is a
+ * source too, numbered behind the patch-sides: 2 patches + light.
  *
- * A BLOCK of a row is what arrives by one CHAIN: the multiset of ideal events
+ * A BLOCK of a row is what arrives by one CHAIN: the multiset of directional events
  * passed on the way (chain 0: none). Values are colourless fractions of the
  * row's flux; every block keeps what left the scene (escape), what met a black
  * back (black), what a reciprocal lobe loses (lost) and what was not followed
- * further (cut). Light that an ideal surface sends on appears again in the
+ * further (cut). Light that a surface sends on directionally appears again in the
  * block of the longer chain, so blocks are not additive: block 0 alone closes,
  *     row_scale (sum of values + escape + black + lost + cut) = 1,
- * and the others close against the ideal entries that feed them.
+ * and the others close against the entries that feed them. Ideal events are followed
+ * in every row, lobes in rows of directional light only: those of emission and of
+ * links. Where a row has no block for light that a lobe sends on, the light goes to a
+ * link.
  *
  * A LINK belongs to a patch-side ("target") with a finite lobe and names a
  * source of light as the target sees it: the patch-sides that the light left (an
@@ -35,7 +39,9 @@ enum ff_row_kind {
 	FF_DIFFUSE = 0,     /* Lambertian, one for each patch-side that can shoot */
 	FF_EMISSION = 1,    /* cos^m lobe about the normal (emission_exponent != 1) */
 	FF_REFLECTED = 2,   /* G about R for one link */
-	FF_TRANSMITTED = 3  /* G about T for one link */
+	FF_TRANSMITTED = 3, /* G about T for one link */
+	FF_LIGHT = 4,       /* of a punctual light: of all its flux, see light.h */
+	FF_ROW_KINDS
 };
 
 struct ff {
@@ -46,9 +52,10 @@ struct ff {
 	size_t chains, chain_events;
 	uint64_t *chain_start;
 	uint32_t *chain_event, *chain_count;
+	uint32_t chain_most;      /* where counts of ideal events of a colour stop */
 
 	size_t rows;
-	uint32_t *row_side;       /* patch-side the flux leaves */
+	uint32_t *row_side;       /* patch-side, or light, that the flux leaves */
 	uint8_t *row_kind;
 	uint32_t *row_samples;    /* rays or hemicube pixels spent on block 0, or as
 	                             many independent rays as gathered values are worth;
@@ -87,13 +94,14 @@ struct ff {
 
 	size_t links;
 	uint32_t *link_target;    /* ascending; then by chain, source */
-	uint32_t *link_source;    /* first patch-side, or FF_ANY */
-	uint32_t *link_last;      /* last patch-side (the same), or FF_ANY */
+	uint32_t *link_source;    /* first patch-side, or a light, or FF_ANY */
+	uint32_t *link_last;      /* last patch-side (the same for light), or FF_ANY */
 	uint32_t *link_chain;
 	float *link_direction;    /* [links][3] mean direction to the source */
 	uint32_t *link_row;       /* [links][2] rows about R and T, or FF_NO_ROW */
 
-	/* The shard: patches [patch_begin, patch_end) leave through these rows. */
+	/* The shard: patches [patch_begin, patch_end), and as large a part of the lights,
+	 * leave through these rows. */
 	uint32_t patch_begin, patch_end;
 	uint32_t part, parts;     /* K/N, 1-based */
 };
