@@ -14,7 +14,7 @@
 #define REVISION_MESH "2"
 #define REVISION_FF "3"
 #define REVISION_RAD "3"
-#define REVISION_VIEW "10"
+#define REVISION_VIEW "12"
 
 /* Strings are owned (malloc) and may be NULL. */
 struct cache_info {

@@ -112,12 +112,17 @@ void gather_want(struct gather *g, uint32_t element_side)
 
 /* ---- corners ---- */
 
-/* The point that stands for corners of elements: next to their vertex, towards the middle
- * of the elements, so that it is on none of the surfaces that meet there. */
+/* The point that stands for corners of elements: their vertex if they are all around it.
+ * At the edge of a surface it is away from the vertex, towards the middle of the elements:
+ * there light falls off steeply in the last fraction of an element, and what is wanted is
+ * the linear function that is right over all of it. */
 struct corner_point {
 	double x[3], n[3];
 	double h[BANDS_MAX];    /* all irradiance there, interpolated */
+	double shift[BANDS_MAX];/* what indirect light has more at the vertex, by interpolation */
 };
+
+static const double towards_middle = .5;
 
 static void centroid(const struct model *m, uint32_t element, double x[3])
 {
@@ -131,7 +136,8 @@ static void find_point(const struct gather *g, const uint32_t *corner, const uin
 {
 	const struct model *m = g->v->m;
 	size_t bands = (size_t)m->bands;
-	double middle[3] = { 0 }, c[3], area = 0, count = 0;
+	const struct reconstruction *all = &g->v->all, *indirect = &g->table.indirect;
+	double middle[3] = { 0 }, c[3], area = 0;
 
 	*p = (struct corner_point){ 0 };
 	for (uint32_t i = 0; i < n; i++) {
@@ -143,17 +149,25 @@ static void find_point(const struct gather *g, const uint32_t *corner, const uin
 		v3_mad(middle, a, c, middle);
 		v3_mad(p->n, side ? -a : a, &m->element_normal[3 * (size_t)e], p->n);
 		area += a;
-		for (size_t b = 0; b < bands; b++)
-			p->h[b] += (double)g->v->all.corner[(2 * (size_t)corner[i] + (size_t)side) * bands + b];
-		count++;
+		for (size_t b = 0; b < bands; b++) {
+			size_t at = (2 * (size_t)corner[i] + (size_t)side) * bands + b, mean[3];
+			for (size_t k = 0; k < 3; k++)
+				mean[k] = (2 * (3 * (size_t)e + k) + (size_t)side) * bands + b;
+			p->h[b] += a * (double)all->corner[at];
+			p->shift[b] += a * towards_middle *
+			               (double)(indirect->corner[at] -
+			                        (indirect->corner[mean[0]] + indirect->corner[mean[1]] +
+			                         indirect->corner[mean[2]]) / 3);
+		}
 	}
 	const double *vertex = &m->vertex[3 * (size_t)m->element[corner[0]]];
-	for (size_t b = 0; b < bands; b++)
-		p->h[b] /= count;
+	for (size_t b = 0; b < bands; b++) {
+		p->h[b] /= area;
+		p->shift[b] /= area;
+	}
 	for (int k = 0; k < 3; k++)
 		middle[k] = middle[k] / area - vertex[k];
-	double reach = v3_length(middle), step = fmax(8 * ray_offset(g->v->rays), 1e-3 * reach);
-	v3_mad(vertex, reach > 0 ? fmin(.3, step / reach) : 0, middle, p->x);
+	v3_mad(vertex, towards_middle, middle, p->x);
 	v3_normalise(p->n);
 	ray_leave(g->v->rays, p->n, p->x);
 }
@@ -222,7 +236,7 @@ static void gather_group(struct gather *g, struct gather_worker *w, size_t group
 			for (uint32_t i = c; i < some; i++)
 				for (size_t b = 0; b < bands && of[i] == c; b++) {
 					size_t at = (2 * (size_t)corner[from + i] + (size_t)side) * bands + b;
-					g->value[at] = (float)h[b];
+					g->value[at] = (float)fmax(0, h[b] + p.shift[b]);
 					g->error[at] = (float)error[b];
 				}
 		}

@@ -60,27 +60,44 @@ static double shown(const struct view_scene *v, const struct reconstruction *r, 
 	                      s->across[b] * (double)h[(size_t)!side * bands + b];
 }
 
+/* A linear function of the weights on a triangle, from its values at an element's corners. */
+struct linear {
+	double w[3][2], det;        /* of the corners */
+};
+
+static void find_linear(const struct model *m, size_t e, struct linear *l)
+{
+	for (size_t k = 0; k < 3; k++)
+		weights(m, m->element_triangle[e], &m->vertex[3 * (size_t)m->element[3 * e + k]], l->w[k]);
+	l->det = (l->w[1][0] - l->w[0][0]) * (l->w[2][1] - l->w[0][1]) -
+	         (l->w[1][1] - l->w[0][1]) * (l->w[2][0] - l->w[0][0]);
+}
+
+/* Adds it to coefficients c[0], c[bands], c[2 bands]. */
+static void add_linear(const struct linear *l, const double value[3], size_t bands, float *c)
+{
+	double p = value[1] - value[0], q = value[2] - value[0];
+	double c1 = l->det != 0 ? (p * (l->w[2][1] - l->w[0][1]) - q * (l->w[1][1] - l->w[0][1])) / l->det : 0;
+	double c2 = l->det != 0 ? (q * (l->w[1][0] - l->w[0][0]) - p * (l->w[2][0] - l->w[0][0])) / l->det : 0;
+
+	c[0] += (float)(value[0] - c1 * l->w[0][0] - c2 * l->w[0][1]);
+	c[bands] += (float)c1;
+	c[2 * bands] += (float)c2;
+}
+
 static void fill_element(const struct view_scene *v, const struct reconstruction *r, size_t e,
                          float *radiance)
 {
-	const struct model *m = v->m;
-	size_t bands = (size_t)m->bands;
-	double w[3][2];
+	size_t bands = (size_t)v->m->bands;
+	struct linear l;
 
-	for (size_t k = 0; k < 3; k++)
-		weights(m, m->element_triangle[e], &m->vertex[3 * (size_t)m->element[3 * e + k]], w[k]);
-	double p1 = w[1][0] - w[0][0], p2 = w[1][1] - w[0][1];
-	double q1 = w[2][0] - w[0][0], q2 = w[2][1] - w[0][1], det = p1 * q2 - p2 * q1;
+	find_linear(v->m, e, &l);
 	for (int side = 0; side < 2; side++)
 		for (size_t b = 0; b < bands; b++) {
-			float *c = radiance + (2 * e + (size_t)side) * 3 * bands + b;
-			double v0 = shown(v, r, 3 * e, side, b), p = shown(v, r, 3 * e + 1, side, b) - v0;
-			double q = shown(v, r, 3 * e + 2, side, b) - v0;
-			double c1 = det != 0 ? (p * q2 - q * p2) / det : 0;
-			double c2 = det != 0 ? (q * p1 - p * q1) / det : 0;
-			c[0] = (float)(v0 - c1 * w[0][0] - c2 * w[0][1]);
-			c[bands] = (float)c1;
-			c[2 * bands] = (float)c2;
+			double value[3];
+			for (size_t k = 0; k < 3; k++)
+				value[k] = shown(v, r, 3 * e + k, side, b);
+			add_linear(&l, value, bands, radiance + (2 * e + (size_t)side) * 3 * bands + b);
 		}
 }
 
@@ -122,7 +139,8 @@ int gather_table_init(struct gather_table *t, const struct view_scene *v, const 
 	t->kind = mem_new(m->elements, 2, "gathering", e);
 	t->bits = mem_new(2 * GATHER_BITS, sizeof *t->bits, "gathering", e);
 	if (!t->radiance || !t->rest || !t->kind || !t->bits || locator_init(&t->locator, m, e) ||
-	    reconstruct(m, s, PART_CAUSTIC | PART_INDIRECT, threads, &rest, e))
+	    reconstruct(m, s, PART_CAUSTIC | PART_INDIRECT, threads, &rest, e) ||
+	    reconstruct(m, s, PART_INDIRECT, threads, &t->indirect, e))
 		return -1;
 	for (size_t i = 0; i < m->elements; i++) {
 		fill_element(v, &v->all, i, t->radiance);
@@ -141,6 +159,7 @@ void gather_table_free(struct gather_table *t)
 	free(t->radiance);
 	free(t->rest);
 	free(t->kind);
+	reconstruction_free(&t->indirect);
 	free(t->bits);
 	if (t->v)
 		locator_free(&t->locator);

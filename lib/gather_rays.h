@@ -12,6 +12,7 @@ struct gather_table {
 	struct locator locator;
 	float *radiance;            /* [2 elements][3][bands] */
 	float *rest;                /* [2 elements][3][bands] the same without direct light */
+	struct reconstruction indirect; /* as interpolated */
 	unsigned char *kind;        /* [2 elements] GATHER_... */
 	uint32_t *bits;             /* [2][GATHER_BITS] of Sobol points */
 };
