@@ -240,7 +240,7 @@ def chain_field(rad):
 
 def ledger_of(arrays):
     terms = ("emitted", "absorbed", "escaped", "lost", "cut")
-    return dict(zip(terms, arrays["ledger"]))
+    return dict(zip(terms, arrays["ledger"].sum(1)))
 
 
 def particle_field(mesh, scene):

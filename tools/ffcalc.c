@@ -143,11 +143,12 @@ static json_t *options_json(const struct ff_options *o)
 
 static json_t *report_json(const struct ff_stats *s)
 {
-	return json_pack("{s:{s:I, s:I, s:I, s:I}, s:I, s:I, s:I, s:f, s:f, s:f, s:f, s:f, s:f}",
+	return json_pack("{s:{s:I, s:I, s:I, s:I, s:I}, s:I, s:I, s:I, s:f, s:f, s:f, s:f, s:f, s:f}",
 		"rows", "diffuse", (json_int_t)s->rows[FF_DIFFUSE],
 		"emission", (json_int_t)s->rows[FF_EMISSION],
 		"reflected", (json_int_t)s->rows[FF_REFLECTED],
 		"transmitted", (json_int_t)s->rows[FF_TRANSMITTED],
+		"lights", (json_int_t)s->rows[FF_LIGHT],
 		"links", (json_int_t)s->links, "blocks", (json_int_t)s->blocks,
 		"entries", (json_int_t)s->entries, "rays", s->rays, "samples", s->samples,
 		"worst_residual", s->worst_residual, "mean_row_error", s->mean_error,
@@ -174,9 +175,9 @@ static void print_report(const struct ff_stats *s, const struct request *r, doub
 {
 	FILE *out = strcmp(r->output, "-") ? stdout : stderr;
 
-	fprintf(out, "rows          %zu diffuse, %zu emission lobes, %zu reflected, %zu transmitted\n",
-	       s->rows[FF_DIFFUSE], s->rows[FF_EMISSION], s->rows[FF_REFLECTED],
-	       s->rows[FF_TRANSMITTED]);
+	fprintf(out, "rows          %zu diffuse, %zu emission lobes, %zu reflected, %zu transmitted, "
+	        "%zu lights\n", s->rows[FF_DIFFUSE], s->rows[FF_EMISSION], s->rows[FF_REFLECTED],
+	        s->rows[FF_TRANSMITTED], s->rows[FF_LIGHT]);
 	fprintf(out, "links         %zu\n", s->links);
 	fprintf(out, "entries       %zu in %zu blocks\n", s->entries, s->blocks);
 	fprintf(out, "rays          %.0f (%.2f Mray/s)\n", s->rays, s->rays / seconds * 1e-6);
@@ -186,12 +187,11 @@ static void print_report(const struct ff_stats *s, const struct request *r, doub
 		fprintf(out, "pairs         %.0f clear, %.0f hidden, %.0f partly (%.1f evaluations each), "
 		        "%.0f sampled\n", s->pairs[0], s->pairs[1], s->pairs[2],
 		        s->evaluations / fmax(1, s->pairs[2]), s->pairs[3]);
-	if (s->curved)
-		fprintf(out, "by rays       %zu of %zu patch-sides are curved\n", s->curved, s->sides);
 	if (r->ff.to_patches && s->directional)
 		fprintf(out, "by rays       what is between patches: there are lobes, mirrors or panes\n");
-	else if (r->ff.to_patches && s->curved)
-		fprintf(out, "by rays       what is between patches: not all are plane\n");
+	if (s->curved)
+		fprintf(out, "by rays       %s %zu of %zu patch-sides: they are curved\n",
+		        r->ff.to_patches ? "pairs with" : "light from", s->curved, s->sides);
 	fprintf(out, "row sums      within %.3g of 1 before scaling\n", s->worst_residual);
 	fprintf(out, "row error     %.3g mean, %.3g worst (%s)\n", s->mean_error, s->worst_error,
 	        s->samples > 0 ? "standard error, root of squares over receivers"

@@ -14,12 +14,13 @@
 #include "../formats/history.h"
 #include "../formats/rad_file.h"
 #include "../lib/camera.h"
+#include "../lib/light_groups.h"
 #include "../lib/mem.h"
 #include "../lib/view.h"
 #include "common/cli.h"
 
 enum { OPT_EYE = 256, OPT_TARGET, OPT_UP, OPT_FOV, OPT_SAMPLES, OPT_LOBE_SAMPLES, OPT_DEPTH,
-       OPT_CUTOFF, OPT_HALF, OPT_COMPRESSION, OPT_LAYERS, OPT_GATHER_RAYS };
+       OPT_CUTOFF, OPT_HALF, OPT_COMPRESSION, OPT_LAYERS, OPT_MIX, OPT_GATHER_RAYS };
 
 static const struct cli_option option_table[] = {
 	{ 'c', "camera", "NAME", "camera to render; repeatable, or 'all'" },
@@ -40,6 +41,8 @@ static const struct cli_option option_table[] = {
 	  "also diffuse,directional,emission,Z,N,element,patch or all" },
 	{ OPT_HALF, "half", NULL, "colours as 16-bit floats" },
 	{ OPT_COMPRESSION, "compression", "METHOD", "zip (default), zips, piz, rle or none" },
+	{ OPT_MIX, "mix", "NAME=X,...",
+	  "scale the light of groups by X, or X:X:X for each band" },
 	{ 0, NULL, NULL, NULL }
 };
 
@@ -55,7 +58,7 @@ struct shot {
 struct trace {
 	struct cli cli;
 	/* options */
-	const char *rad, *output;
+	const char *rad, *output, *mix;
 	const char **camera;        /* [cameras] names asked for */
 	int cameras, all;
 	int width, height;
@@ -151,6 +154,7 @@ static void take_option(struct trace *t, int letter)
 		t->view.depth = (int)cli_integer(c, "--depth", optarg, 0, 100000);
 		break;
 	case OPT_CUTOFF: t->view.cutoff = cli_number(c, "--cutoff", optarg, 0, 1); break;
+	case OPT_MIX: t->mix = optarg; break;
 	case OPT_HALF: t->exr.half = 1; break;
 	case OPT_COMPRESSION: compression(t, optarg); break;
 	case OPT_LAYERS:
@@ -234,6 +238,8 @@ static void picture_key(const struct trace *t, struct shot *s)
 	digest_string(d, t->content);
 	digest_string(d, camera);
 	digest_bytes(d, number, sizeof number);
+	if (t->mix)
+		digest_string(d, t->mix);
 	digest_end(d, s->key);
 }
 
@@ -301,9 +307,12 @@ static int plan(struct trace *t, struct err *e)
 static int read_scene(struct trace *t, int argc, char **argv, struct err *e)
 {
 	double begun = cli_seconds();
+	struct err why = { 0 };
 
 	if (rad_file_read(t->rad, &t->m, &t->s, &t->info, e))
 		return -1;
+	if (t->mix && light_groups_mix(&t->s, &t->m, t->mix, &why))
+		return err_set(e, "%s: --mix: %s", t->rad, why.text);
 	t->history = history_append(t->info.history, argc, argv, e);
 	double read = cli_seconds();
 	t->rays = ray_scene_new(&t->m, e);
