@@ -93,10 +93,11 @@ def section(run):
         defaults; a further view is one more camera in the same run. *MB* is the peak of memory.
         *Picture* is the relative rmse of the first view at the centres of its pixels, *bias*
         of its mean, *99 %* the 99th percentile of the relative error of pixels (lengths over
-        R, G, B; – where half of that may be noise of the yardstick), all without the pixels
-        that see a lamp or nothing. *Irradiance* is the relative rmse of elements, weighted by
-        area. *Of reference* is what `reference` reaches in the same processor seconds, between runs of {listed(run.plan.ladder)} paths a pixel
-        and {listed(run.plan.crowd)} particles, and beyond them by the square root.""")
+        R, G, B; without the yardstick's noise to first order, – where that is more than half),
+        all without the pixels that see a lamp or nothing. *Irradiance* is the relative rmse of
+        elements, weighted by area. *Of reference* is what `reference` reaches in the same
+        processor seconds, between runs of {listed(run.plan.ladder)} paths a pixel and
+        {listed(run.plan.crowd)} particles, and beyond them by the square root.""")
     yield Words("Yardsticks: " + "; ".join(
         f"{s.name}, camera {s.camera} {s.size()}: {s.samples} paths in every ninth pixel, whose "
         f"99 % is {percent(noise(mine_of(run.rows, s.name)))}; {s.particles:g} particles"
