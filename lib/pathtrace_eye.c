@@ -139,33 +139,21 @@ static double sight(const struct pathtrace *p, const struct vertex *v, size_t li
 	return sum * s->across * s->falloff * fabs(v3_dot(v->n, s->toward));
 }
 
-/* Next-event estimation: one of the punctual lights, chosen by its irradiance. */
+/* Adds `times` what a vertex gets of a light. */
 static void add_light(const struct pathtrace *p, const struct eye_path *path,
-                      const struct vertex *v, double u, double *radiance)
+                      const struct vertex *v, size_t light, double times, double *radiance)
 {
 	const struct model *m = p->m;
+	const double *intensity = &m->light.intensity[light * (size_t)m->bands];
 	double wo[3] = { -path->dir[0], -path->dir[1], -path->dir[2] };
-	double f[BANDS_MAX], from[3], sum = 0, here = 0, left, any = 0;
+	double f[BANDS_MAX], from[3], any = 0;
 	struct light_sight s;
-	size_t i = 0;
 
-	for (size_t k = 0; k < m->light.n; k++)
-		sum += sight(p, v, k, &s);
-	if (!(sum > 0))
-		return;
-	for (left = u * sum; i < m->light.n; i++) {
-		here = sight(p, v, i, &s);
-		if (here > 0 && left < here)
-			break;
-		left -= here;
-	}
-	if (i == m->light.n)
-		return;
+	sight(p, v, light, &s);
 	bsdf_eval(m, v->material, v->n, s.toward, wo, f);
-	double scale = s.across * s.falloff * fabs(v3_dot(v->n, s.toward)) * sum / here;
+	double scale = times * s.across * s.falloff * fabs(v3_dot(v->n, s.toward));
 	for (int b = 0; b < m->bands; b++) {
-		f[b] *= path->throughput[b] * scale *
-		        m->light.intensity[i * (size_t)m->bands + (size_t)b];
+		f[b] *= path->throughput[b] * scale * intensity[b];
 		any = fmax(any, f[b]);
 	}
 	if (!(any > 0))
@@ -175,6 +163,30 @@ static void add_light(const struct pathtrace *p, const struct eye_path *path,
 		return;
 	for (int b = 0; b < m->bands; b++)
 		radiance[b] += f[b];
+}
+
+/* Next-event estimation of punctual lights: all for the first vertex, and then one, chosen
+ * by its irradiance. */
+static void add_lights(const struct pathtrace *p, const struct eye_path *path,
+                       const struct vertex *v, int first, double u, double *radiance)
+{
+	double sum = 0, left, here;
+	struct light_sight s;
+
+	for (size_t i = 0; i < p->m->light.n; i++) {
+		if (first)
+			add_light(p, path, v, i, 1, radiance);
+		else
+			sum += sight(p, v, i, &s);
+	}
+	left = u * sum;
+	for (size_t i = 0; sum > 0 && i < p->m->light.n; i++, left -= here) {
+		here = sight(p, v, i, &s);
+		if (here > 0 && left < here) {
+			add_light(p, path, v, i, sum / here, radiance);
+			return;
+		}
+	}
 }
 
 /* Extends the path. 0 = it ends. */
@@ -215,7 +227,7 @@ static void follow(const struct pathtrace *p, struct eye_path *path, const doubl
 		if (p->emitters)
 			add_direct(p, path, &v, bounce ? u : light, radiance);
 		if (p->m->light.n)
-			add_light(p, path, &v, bounce ? u[0] : light[0], radiance);
+			add_lights(p, path, &v, bounce == 0, u[0], radiance);
 		if (!scatter(p, path, &v, r))
 			return;
 		if (bounce >= FREE_BOUNCES && !pathtrace_roulette(path->throughput, p->m->bands, r))
