@@ -66,6 +66,17 @@ check "a moved one does not" sh -c \
 	"! ffcalc '$T/moved.mesh' -o '$T/dim.ff' $F 2>&1 | grep -q 'up to date'"
 refuses 1 "made for another geometry" "nor do they fit" shoot "$T/moved.mesh" "$T/a.ff" -o "$T/out"
 
+# The closed form of a scene.
+prepare mesh "$scenes/lamps.gltf" -o "$T/lamps.mesh" -e 5%
+prepare ffcalc "$T/lamps.mesh" -o "$T/lamps.ff"
+prepare shoot "$T/lamps.mesh" "$T/lamps.ff" -o "$T/lamps.rad"
+inspect "$T/lamps.rad" --csv | $PYTHON -c '
+import sys, chain
+flux = sum(r["area"] * r["H_0"] for r in chain.table(sys.stdin.read()))
+print("#", flux)
+sys.exit(abs(flux - 505.5722636) > 1e-3)'
+result $? "flux of the lamps"
+
 # Files that are wrong.
 wrong() {
 	edit "$T/a.gltf" "$T/wrong.gltf" "l = g['extensions']['KHR_lights_punctual']['lights']; $3"
