@@ -6,14 +6,18 @@
  * touch it, the mean of that is its curvature, which costs interpolation a third of it.
  * Its variation, less what the standard errors of the elements put into it, is of steps
  * (shadow edges, contacts, rims of caustics), which cost more than they show: a step
- * through the middle of an element is felt through its neighbours. */
+ * through the middle of an element is felt through its neighbours.
+ *
+ * The same differences tell how good the standard errors are: they take samples for
+ * independent, while stratified ones do better. */
 #ifndef TWOPASS_DISCRETISATION_H
 #define TWOPASS_DISCRETISATION_H
 
 #include "model.h"
 #include "solution.h"
 
-/* Fills s->discretisation [2E][bands], in units of irradiance: root mean square over
+/* Scales s->error, all alike, down to what most elements differ by from their neighbours,
+ * if that is less. Fills s->discretisation [2E][bands], in units of irradiance: root mean square over
  * the element-side. 0 where too few others of the same smooth surface touch it and its
  * neighbours, since nothing is known there. Light groups are summed. O(elements), the same
  * for any number of threads. 0, or -1 and e. */
