@@ -170,7 +170,7 @@ static int prepare_rows(struct ff_job *j, int patches, struct err *e)
 		return -1;
 	if (formula && ff_formula_init(&j->formula, j->m, j->o.method == FF_ANALYTIC, e))
 		return -1;
-	return make_samples(j, e) || make_places(j, e) ? -1 : 0;
+	return make_samples(j, e) || make_places(j, e) || ff_find_chain_most(j, e) ? -1 : 0;
 }
 
 static void job_free(struct ff_job *j)
@@ -196,7 +196,7 @@ static int thread_init(struct ff_thread *t, const struct ff_job *j, struct err *
 	                                    FORMULA_BODIES, 0 };
 
 	*t = (struct ff_thread){ .job = j };
-	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, e))
+	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, j->chain_most, e))
 		return -1;
 	if (j->formula.on) {
 		t->formula = mem_new(1, sizeof *t->formula, "formulas", e);
@@ -220,6 +220,7 @@ static void thread_free(struct ff_thread *t)
 		exchanger_free(t->formula);
 	free(t->formula);
 	free(t->captures.data);
+	free(t->pairs.data);
 	free(t->sights.data);
 	free(t->lit.data);
 	free(t->item);
@@ -415,7 +416,7 @@ static int build_rows(struct ff_job *j, int patches, struct ff *whole, struct ff
 	int threads = j->o.threads > 0 ? j->o.threads : 1;
 	struct chains chains = { 0 };
 	struct run run = { .job = j };
-	int bad = prepare_rows(j, patches, e) || chains_init(&chains, j->m, e);
+	int bad = prepare_rows(j, patches, e) || chains_init(&chains, j->m, j->chain_most, e);
 
 	run.thread = mem_new((size_t)threads, sizeof *run.thread, "threads", e);
 	run.batch = mem_new(PATCHES_AT_A_TIME, sizeof *run.batch, "batches", e);
@@ -431,6 +432,7 @@ static int build_rows(struct ff_job *j, int patches, struct ff *whole, struct ff
 		      all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats, sink,
 		                  progress, e);
 	bad = bad || all_lights(&run, &chains, stats, sink, e) || put_chains(whole, &chains, e);
+	whole->chain_most = j->chain_most;
 	for (int t = 0; run.thread && t < threads; t++) {
 		stats->rays += run.thread[t].rays;
 		if (run.thread[t].formula)
@@ -453,7 +455,7 @@ static int build_matrix(struct ff_job *j, struct ff *whole, struct ff_stats *sta
 	if (j->m->light.n)
 		return ff_matrix(j, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
 		       build_rows(j, 0, whole, stats, sink, progress, e) ? -1 : 0;
-	whole->chains = 1;
+	whole->chains = whole->chain_most = 1;
 	whole->chain_start = mem_new(2, sizeof *whole->chain_start, "chains", e);
 	return whole->chain_start ? ff_matrix(j, whole->patch_begin, whole->patch_end, sink, stats,
 	                                      progress, e) : -1;
