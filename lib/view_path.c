@@ -7,6 +7,7 @@
 #include "lobe.h"
 #include "rng.h"
 #include "vec3.h"
+#include "view_lights.h"
 #include "view_shade.h"
 
 /* Backs of one-sided materials in a row that a ray may pass. */
@@ -139,6 +140,17 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b, str
 		emission[i] += b->weight[i] * h[i];
 }
 
+/* Adds the highlights of punctual lights, which no ray of a lobe can meet. */
+static void add_highlights(struct view_walker *w, const struct view_branch *b,
+                           const struct point *p)
+{
+	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] }, l[BANDS_MAX];
+
+	view_highlights(w->v, p->material, p->x, p->n, out, l, &w->rays);
+	for (int i = 0; i < w->v->m->bands; i++)
+		w->directional[i] += b->weight[i] * l[i];
+}
+
 /* Puts a branch that carries `scale` times `coefficient` of b's weight on the
  * stack, or cuts it and books its bound. One of many samples of a lobe is cut by
  * what all of them carry. */
@@ -243,6 +255,8 @@ static void follow_branch(struct view_walker *w, const struct view_branch *b)
 	if (!s->reflected.coefficient && !s->transmitted.coefficient)
 		return;
 	locate(v, &p);
+	if (v->highlights)
+		add_highlights(w, b, &p);
 	if (s->reflected.coefficient)
 		branch_off(w, b, &p, &s->reflected, 0);
 	if (s->transmitted.coefficient)

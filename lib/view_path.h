@@ -34,6 +34,7 @@ struct view_scene {
 	struct direct *direct;
 	struct view_side *side;     /* [2 materials] */
 	int tails;                  /* something reflects or transmits directionally */
+	int highlights;             /* there are punctual lights, and finite lobes */
 	double ceiling[BANDS_MAX];  /* no radiance along an unsampled tail exceeds it */
 };
 
