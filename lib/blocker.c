@@ -35,10 +35,12 @@ int blocker_make(const struct body_set *s, uint32_t body, const struct facet *f,
 	struct cut cut = { { 0 }, { { { 0 } } } };
 
 	out->edges = 0;
-	out->apart = -1;
 	out->faces = (int)b->faces;
 	out->flat = b->flat;
 	memcpy(out->face, &s->face[b->face], b->faces * sizeof *out->face);
+	out->face[b->faces].offset = -f->offset;
+	for (int k = 0; k < 3; k++)
+		out->face[b->faces].normal[k] = -f->normal[k];
 	memcpy(out->centre, b->centre, sizeof out->centre);
 	for (uint32_t i = 0; i < b->edges; i++) {
 		const struct body_edge *e = &s->edge[b->edge + i];

@@ -12,11 +12,10 @@ struct blocker {
 	int edges, faces, flat;
 	struct {
 		double a[3], b[3];
-		int left, right;      /* faces; `faces` = the cut, which no eye is in front of */
+		int left, right;      /* faces; `faces` is the cut */
 	} edge[BLOCKER_EDGES];
-	struct plane face[BODY_FACES];
+	struct plane face[BODY_FACES + 1];
 	double centre[3];
-	int apart;                /* an edge that had the last view on its far side, or -1 */
 };
 
 /* The part of a body in front of the plane of facet b into `out`. 0 if nothing is. */

@@ -49,7 +49,6 @@ struct integral {
 
 void occluded_free(struct occluded *o)
 {
-	seer_free(&o->seer);
 	free(o->cell.data);
 	*o = (struct occluded){ 0 };
 }
@@ -285,7 +284,7 @@ double occluded_exchange(struct occluded *o, struct clear *clear, const struct s
 		in.g = l->a;
 		make_blockers(o, l, l->a);
 	}
-	o->seer.near = in.near;
+	seer_begin(&o->seer, o->blockers, in.near);
 	o->cell.n = 0;
 	uint64_t all = o->blockers ? UINT64_MAX >> (64 - o->blockers) : 0;
 	/* Cutting pays where more is asked for than cells across shadows' edges can tell. */
