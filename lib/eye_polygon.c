@@ -89,11 +89,12 @@ static four angle(four y, four x)
 	four low = four_choose(steep, far, y), high = four_choose(steep, y, far);
 	four_mask turned = low > eighth * high;     /* by 45 degrees */
 	four up = four_choose(turned, low - high, low), across = four_choose(turned, low + high, high);
-	four q = up / four_choose(across > 0, across, four_all(1)), t = q * q, sum = four_all(arc[11]);
-
-	for (int i = 10; i >= 0; i--)
-		sum = sum * t + arc[i];
-	sum = sum * q + four_choose(turned, four_all(PI / 4), four_all(0));
+	four q = up / four_choose(across > 0, across, four_all(1)), t = q * q;
+	/* In pairs and fours, which wait less for one another. */
+	four t2 = t * t, t4 = t2 * t2, third[3];
+	for (int i = 0; i < 3; i++)
+		third[i] = arc[4 * i] + arc[4 * i + 1] * t + t2 * (arc[4 * i + 2] + arc[4 * i + 3] * t);
+	four sum = (third[0] + t4 * (third[1] + t4 * third[2])) * q + four_choose(turned, four_all(PI / 4), four_all(0));
 	sum = four_choose(steep, PI / 2 - sum, sum);
 	return four_choose(x < 0, PI - sum, sum);
 }
