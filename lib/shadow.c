@@ -119,6 +119,32 @@ static int parallel(const double a[3], const double b[3], const double c[3], con
 	return v3_dot(s, s) <= 1e-12 * v3_dot(u, u) * v3_dot(v, v);
 }
 
+/* Bits of a blocker's faces that a point is surely in front of, and behind. */
+struct faces {
+	uint64_t front, behind;
+};
+
+static struct faces faces_from(const struct blocker *b, const double x[3], double near)
+{
+	struct faces f = { 0, 0 };
+
+	for (int i = 0; i <= b->faces; i++) {
+		double h = plane_height(&b->face[i], x);
+		f.front |= (uint64_t)(h > near) << i;
+		f.behind |= (uint64_t)(h < -near) << i;
+	}
+	return f;
+}
+
+/* Is an edge inside the blocker's silhouette as seen from a point? So it is, then, for
+ * all that see it in line with that point. */
+static int within(const struct blocker *b, int edge, struct faces f)
+{
+	uint64_t both = (uint64_t)1 << b->edge[edge].left | (uint64_t)1 << b->edge[edge].right;
+
+	return !b->flat && ((f.front & both) == both || (f.behind & both) == both);
+}
+
 /* Does a face of the blocker have both facets in front of it, or an edge's plane through a
  * corner of f the blocker on one side and them on the other? */
 static void find_idle(struct cuts *c, const struct blocker *b, int number)
@@ -133,23 +159,28 @@ static void find_idle(struct cuts *c, const struct blocker *b, int number)
 		else if (!of_f && (b->flat || !of_g))
 			add(c, &c->s->edges, &b->face[i], (uint64_t)1 << number);
 	}
-	for (int i = 0; i < b->edges && !(c->s->idle >> number & 1); i++)
-		for (int j = 0; j < c->f->n; j++)
-			if (plane_through(b->edge[i].a, b->edge[i].b, &c->f->v[3 * j], c->near, &p) &&
+	for (int j = 0; j < c->f->n; j++) {
+		struct faces of_x = faces_from(b, &c->f->v[3 * j], c->near);
+		for (int i = 0; i < b->edges && !(c->s->idle >> number & 1); i++)
+			if (!within(b, i, of_x) && plane_through(b->edge[i].a, b->edge[i].b, &c->f->v[3 * j], c->near, &p) &&
 			    side_of(&p, c->f->v, c->f->n, 3, c->near))
 				consider(c, b, number, &p, 0);
+	}
 }
 
 static void blocker_cuts(struct cuts *c, const struct blocker *b, int number)
 {
 	const struct facet *g = c->g;
+	struct faces of_g[FACET_CORNERS];
 	struct plane p;
 
+	for (int j = 0; j < g->n; j++)
+		of_g[j] = faces_from(b, &g->v[3 * j], c->near);
 	for (int i = 0; i < b->edges; i++)
 		for (int j = 0; j < g->n && !(c->s->idle >> number & 1); j++) {
 			const double *from = b->edge[i].a, *to = b->edge[i].b, *v = &g->v[3 * j];
 			const double *next = &g->v[3 * ((j + 1) % g->n)];
-			if (plane_through(from, to, v, c->near, &p))
+			if (!within(b, i, of_g[j]) && plane_through(from, to, v, c->near, &p))
 				consider(c, b, number, &p, parallel(from, to, v, next));
 			if (plane_through(v, next, from, c->near, &p))
 				consider(c, b, number, &p, 0);
