@@ -21,14 +21,14 @@ struct cell {
 /* What may be wrong with a cell, as a fraction of `most`: before it is compared with its
  * quarters; where its points may all have missed the edge of a shadow; where its corners
  * have, too, and known edges end it. */
-static const double unproved = .1, unseen = .02, unlikely = 1e-4;
+static const double unproved = .1, unseen = .1, unlikely = 1e-4;
 
 /* What its centre says of a cell that is not compared yet: nothing better than this. */
 static const double surmised = 1e-3;
 
 /* How many times smaller a quarter's error may be than that of the whole, at most: where a
  * shadow's edge is not known, the sum over quarters may agree by accident. */
-static const double fall = 4096;
+static const double fall = 256;
 
 enum { HALVINGS = 5 };        /* of the facet seen, to prove that several blockers hide it */
 
