@@ -5,13 +5,14 @@
 #include "body.h"
 #include "facet.h"
 
-enum { BLOCKER_EDGES = BODY_EDGES + BODY_FACES };
+enum { BLOCKER_EDGES = BODY_EDGES + BODY_FACES, BLOCKER_CORNERS = BLOCKER_EDGES };
 
 /* A body, or what of it is in front of a facet. */
 struct blocker {
-	int edges, faces, flat;
+	int corners, edges, faces, flat;
+	double corner[BLOCKER_CORNERS][3];
 	struct {
-		double a[3], b[3];
+		double a[3], b[3], along[3];  /* unit vector from a to b */
 		int left, right;      /* faces; `faces` is the cut */
 	} edge[BLOCKER_EDGES];
 	struct plane face[BODY_FACES + 1];

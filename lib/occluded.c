@@ -262,8 +262,8 @@ static double clearance(const struct occluded *o, const struct facet *f)
 	double least = INFINITY;
 
 	for (int i = 0; i < o->blockers; i++)
-		for (int k = 0; k < o->seer.blocker[i].edges; k++)
-			least = fmin(least, fmax(0, v3_dot(f->normal, o->seer.blocker[i].edge[k].a) -
+		for (int k = 0; k < o->seer.blocker[i].corners; k++)
+			least = fmin(least, fmax(0, v3_dot(f->normal, o->seer.blocker[i].corner[k]) -
 			                            f->offset));
 	return least;
 }
