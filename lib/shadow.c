@@ -228,13 +228,15 @@ static void gap_cuts(struct cuts *c, const struct blocker *a, const struct block
 {
 	struct plane p;
 
-	for (int i = 0; i < a->edges; i++)
-		for (int j = 0; j < b->edges; j++)
-			if (parallel(a->edge[i].along, b->edge[j].along) &&
+	for (int j = 0; j < b->edges; j++) {
+		struct faces of_x = faces_from(a, b->edge[j].a, c->near);
+		for (int i = 0; i < a->edges; i++)
+			if (parallel(a->edge[i].along, b->edge[j].along) && !within(a, i, of_x) &&
 			    plane_through(a->edge[i].a, a->edge[i].along, b->edge[j].a, c->near, &p) &&
 			    !side_of(&p, c->f->v, c->f->n, c->near) &&
 			    blocker_side(a, &p, c->near) * blocker_side(b, &p, c->near) < 0)
 				add(c, &c->s->edges, &p, of);
+	}
 }
 
 /* Planes through an edge of one blocker and a corner of another with each on one side:
@@ -244,9 +246,11 @@ static void meeting_cuts(struct cuts *c, const struct blocker *a, const struct b
 {
 	struct plane p;
 
-	for (int i = 0; i < a->edges; i++)
-		for (int j = 0; j < b->corners; j++) {
-			if (!plane_through(a->edge[i].a, a->edge[i].along, b->corner[j], c->near, &p) ||
+	for (int j = 0; j < b->corners; j++) {
+		struct faces of_x = faces_from(a, b->corner[j], c->near);
+		for (int i = 0; i < a->edges; i++) {
+			if (within(a, i, of_x) ||
+			    !plane_through(a->edge[i].a, a->edge[i].along, b->corner[j], c->near, &p) ||
 			    side_of(&p, c->f->v, c->f->n, c->near))
 				continue;
 			int side = blocker_side(a, &p, c->near);
@@ -254,6 +258,7 @@ static void meeting_cuts(struct cuts *c, const struct blocker *a, const struct b
 			if (side)
 				add(c, side < 0 ? &c->s->edges : &c->s->bends, &p, of);
 		}
+	}
 }
 
 void shadow_edges(const struct blocker *b, int blockers, const struct facet *f,
