@@ -161,7 +161,8 @@ static void judge(struct matrix *m, size_t r)
 	row->side = m->side[m->first + r];
 	row->residual = 1 - sum;
 	row->error = row->error / area + m->thread[0].x.o.relative * sum;
-	if (row->residual > 0)
+	/* What the formulas leave at any rate is not worth rays. */
+	if (row->residual > m->thread[0].x.o.relative)
 		rest(m, row->side, &escapes, &blacks);
 	m->closed[r] = !(escapes + blacks) && row->residual <= CERTAIN * row->error;
 	if (m->closed[r])
