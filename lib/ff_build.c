@@ -44,12 +44,19 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 	                  bsdf_has_lobe(mt, material, side, 1);
 	j->is_ideal[ps] = bsdf_has_ideal(mt, material, side, 0) ||
 	                  bsdf_has_ideal(mt, material, side, 1);
+	j->has_panes |= bsdf_has_ideal(mt, material, side, 1);
+	j->has_ideal |= j->is_ideal[ps];
 	j->is_source[ps] = j->shoots_diffuse[ps] || j->shoots_lobe[ps] ||
 	                   bsdf_has_lobe(mt, material, side, 0) ||
 	                   bsdf_has_lobe(mt, material, !side, 1);
 }
 
 /* ---- a job ---- */
+
+static int by_formula(const struct ff_options *o)
+{
+	return o->method == FF_ANALYTIC || o->method == FF_AUTO;
+}
 
 static int job_arrays(struct ff_job *j, struct err *e)
 {
@@ -147,13 +154,23 @@ static int job_init(struct ff_job *j, const struct model *m, const struct ff_opt
 	if (job_arrays(j, e) || locator_init(&j->locator, m, e) ||
 	    !(j->rays = ray_scene_new(m, e)))
 		return -1;
-	if (o->method == FF_HEMICUBE && (hemi_grid_init(&j->grid, (int)o->rays, e) ||
-	                                 !(j->cubes = hemi_scene_new(m, e))))
-		return -1;
 	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
 		side_flags(j, ps);
 	ff_element_table(j);
-	return make_samples(j, e) || make_places(j, e) ? -1 : 0;
+	return 0;
+}
+
+/* What rows that are computed one by one need beside. */
+static int prepare_rows(struct ff_job *j, int patches, struct err *e)
+{
+	int formula = patches && by_formula(&j->o), cubes = patches && j->o.method == FF_HEMICUBE;
+
+	if (cubes && (hemi_grid_init(&j->grid, (int)j->o.rays, e) ||
+	              !(j->cubes = hemi_scene_new(j->m, e))))
+		return -1;
+	if (formula && ff_formula_init(&j->formula, j->m, j->o.method == FF_ANALYTIC, e))
+		return -1;
+	return make_samples(j, e) || make_places(j, e) || ff_find_chain_most(j, e) ? -1 : 0;
 }
 
 static void job_free(struct ff_job *j)
@@ -179,7 +196,7 @@ static int thread_init(struct ff_thread *t, const struct ff_job *j, struct err *
 	                                    FORMULA_BODIES, 0 };
 
 	*t = (struct ff_thread){ .job = j };
-	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, e))
+	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, j->chain_most, e))
 		return -1;
 	if (j->formula.on) {
 		t->formula = mem_new(1, sizeof *t->formula, "formulas", e);
@@ -203,13 +220,15 @@ static void thread_free(struct ff_thread *t)
 		exchanger_free(t->formula);
 	free(t->formula);
 	free(t->captures.data);
+	free(t->pairs.data);
 	free(t->sights.data);
+	free(t->lit.data);
 	free(t->item);
 	free(t->view);
 	free(t->chain_map.data);
 }
 
-/* ---- the loop over patches ---- */
+/* ---- the loop over patches, and then lights ---- */
 
 struct run {
 	const struct ff_job *job;
@@ -225,9 +244,11 @@ static void do_patches(void *arg, size_t begin, size_t end, int thread)
 	struct run *r = arg;
 
 	for (size_t i = begin; i < end; i++) {
-		uint32_t patch = r->first + (uint32_t)i;
+		uint32_t patch = r->first + (uint32_t)i, patches = (uint32_t)r->job->m->patches;
 		r->owner[i] = thread;
-		if (r->job->o.method == FF_HEMICUBE)
+		if (patch >= patches)
+			ff_light_row(&r->thread[thread], patch - patches, &r->batch[i], &r->err[i]);
+		else if (r->job->o.method == FF_HEMICUBE)
 			ff_patch_hemicube(&r->thread[thread], patch, &r->batch[i], &r->err[i]);
 		else
 			ff_patch_rays(&r->thread[thread], patch, &r->batch[i], &r->err[i]);
@@ -239,14 +260,14 @@ void ff_count(struct ff_stats *s, const struct ff *f)
 	for (size_t r = 0; r < f->rows; r++) {
 		double cut = 0;
 		s->rows[f->row_kind[r]]++;
-		s->worst_residual = fmax(s->worst_residual, fabs(f->row_residual[r]));
+		s->worst_residual = fmax(s->worst_residual, fabs((double)f->row_residual[r]));
 		for (uint64_t b = f->row_block[r]; b < f->row_block[r + 1]; b++)
 			cut += f->block_cut[b] * f->row_scale[r];
 		s->cut = fmax(s->cut, cut);
 		if (f->row_kind[r] == FF_DIFFUSE) {
 			s->samples += f->row_samples[r];
-			s->mean_error += f->row_error[r];
-			s->worst_error = fmax(s->worst_error, f->row_error[r]);
+			s->mean_error += (double)f->row_error[r];
+			s->worst_error = fmax(s->worst_error, (double)f->row_error[r]);
 		}
 	}
 	s->links += f->links;
@@ -312,6 +333,7 @@ static int gather(struct ff_job *j, struct ff_stats *stats, const struct progres
 	return ff_gather(j, &stats->rays, &inner, e);
 }
 
+/* Patches [begin, end), or lights, numbered behind the patches. */
 static int all_patches(struct run *r, uint32_t begin, uint32_t end, struct chains *whole,
                        struct ff_stats *stats, const struct ff_sink *sink,
                        const struct progress *progress, struct err *e)
@@ -327,6 +349,23 @@ static int all_patches(struct run *r, uint32_t begin, uint32_t end, struct chain
 			return -1;
 	}
 	return 0;
+}
+
+/* Where the k-th of `parts` equal shares of n ends. */
+static uint32_t share(size_t n, uint32_t k, uint32_t parts)
+{
+	return (uint32_t)((uint64_t)n * k / parts);
+}
+
+static int all_lights(struct run *r, struct chains *whole, struct ff_stats *stats,
+                      const struct ff_sink *sink, struct err *e)
+{
+	const struct ff_options *o = &r->job->o;
+	size_t lights = r->job->m->light.n;
+	uint32_t patches = (uint32_t)r->job->m->patches;
+
+	return all_patches(r, patches + share(lights, o->part - 1, o->parts),
+	                   patches + share(lights, o->part, o->parts), whole, stats, sink, NULL, e);
 }
 
 /* ---- the chain table of the file ---- */
@@ -369,58 +408,81 @@ static void count_curved(const struct ff_job *j, struct ff_stats *s)
 	}
 }
 
-int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole,
-             struct ff_stats *stats, const struct ff_sink *sink,
-             const struct progress *progress, struct err *e)
+/* All rows, one after the other; without `patches` those of lights only. */
+static int build_rows(struct ff_job *j, int patches, struct ff *whole, struct ff_stats *stats,
+                      const struct ff_sink *sink, const struct progress *progress,
+                      struct err *e)
 {
-	struct ff_job job;
+	int threads = j->o.threads > 0 ? j->o.threads : 1;
 	struct chains chains = { 0 };
-	int threads = o->threads > 0 ? o->threads : 1;
-	struct run run = { .job = &job };
-	int bad = job_init(&job, m, o, e) || chains_init(&chains, m, e);
-	int formula = o->method == FF_ANALYTIC || o->method == FF_AUTO;
-	int matrix = !bad && formula && o->to_patches && ff_matrix_can(&job);
+	struct run run = { .job = j };
+	int bad = prepare_rows(j, patches, e) || chains_init(&chains, j->m, j->chain_most, e);
 
-	if (!bad && o->close && !matrix)
-		bad = err_set(e, "--close needs factors to patches by formula (-m auto --to patches) "
-		              "in a model of plane patches without lobes, mirrors and panes");
-	*stats = (struct ff_stats){ 0 };
-	*whole = (struct ff){ .part = o->part, .parts = o->parts };
-	if (!bad && formula)
-		count_curved(&job, stats);
-	whole->patch_begin = (uint32_t)((uint64_t)m->patches * (o->part - 1) / o->parts);
-	whole->patch_end = (uint32_t)((uint64_t)m->patches * o->part / o->parts);
 	run.thread = mem_new((size_t)threads, sizeof *run.thread, "threads", e);
 	run.batch = mem_new(PATCHES_AT_A_TIME, sizeof *run.batch, "batches", e);
 	run.owner = mem_new(PATCHES_AT_A_TIME, sizeof *run.owner, "batches", e);
 	run.err = mem_new(PATCHES_AT_A_TIME, sizeof *run.err, "batches", e);
 	bad = bad || !run.thread || !run.batch || !run.owner || !run.err;
-	if (formula && !matrix)
-		bad = bad || ff_formula_init(&job.formula, m, o->method == FF_ANALYTIC, e);
 	for (int t = 0; !bad && t < threads; t++)
-		bad = thread_init(&run.thread[t], &job, e);
+		bad = thread_init(&run.thread[t], j, e);
 	for (size_t i = 0; !bad && i < PATCHES_AT_A_TIME; i++)
-		run.batch[i].f64 = o->f64;
-	if (matrix)
-		bad = bad || ff_matrix(&job, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
-		      put_chains(whole, &chains, e);
-	else
-		bad = bad || gather(&job, stats, progress, e) ||
-		      all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats,
-	                         sink, progress, e) || put_chains(whole, &chains, e);
+		run.batch[i].f64 = j->o.f64;
+	if (patches)
+		bad = bad || gather(j, stats, progress, e) ||
+		      all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats, sink,
+		                  progress, e);
+	bad = bad || all_lights(&run, &chains, stats, sink, e) || put_chains(whole, &chains, e);
+	whole->chain_most = j->chain_most;
 	for (int t = 0; run.thread && t < threads; t++) {
 		stats->rays += run.thread[t].rays;
 		if (run.thread[t].formula)
 			ff_count_pairs(stats, &run.thread[t].formula->counts);
 		thread_free(&run.thread[t]);
 	}
-	if (stats->rows[FF_DIFFUSE])
-		stats->mean_error /= (double)stats->rows[FF_DIFFUSE];
 	free(run.thread);
 	free(run.batch);
 	free(run.owner);
 	free(run.err);
 	chains_free(&chains);
+	return bad ? -1 : 0;
+}
+
+/* The matrix between patches, whose rows have no chains, and the rows of lights. */
+static int build_matrix(struct ff_job *j, struct ff *whole, struct ff_stats *stats,
+                        const struct ff_sink *sink, const struct progress *progress,
+                        struct err *e)
+{
+	if (j->m->light.n)
+		return ff_matrix(j, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
+		       build_rows(j, 0, whole, stats, sink, progress, e) ? -1 : 0;
+	whole->chains = whole->chain_most = 1;
+	whole->chain_start = mem_new(2, sizeof *whole->chain_start, "chains", e);
+	return whole->chain_start ? ff_matrix(j, whole->patch_begin, whole->patch_end, sink, stats,
+	                                      progress, e) : -1;
+}
+
+int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole,
+             struct ff_stats *stats, const struct ff_sink *sink,
+             const struct progress *progress, struct err *e)
+{
+	struct ff_job job;
+	int bad = job_init(&job, m, o, e);
+	int matrix = !bad && by_formula(o) && o->to_patches && ff_matrix_can(&job);
+
+	*stats = (struct ff_stats){ 0 };
+	*whole = (struct ff){ .part = o->part, .parts = o->parts };
+	whole->patch_begin = share(m->patches, o->part - 1, o->parts);
+	whole->patch_end = share(m->patches, o->part, o->parts);
+	if (!bad && o->close && !matrix)
+		bad = err_set(e, "--close needs factors to patches by formula (-m auto --to patches) "
+		              "in a model without lobes, mirrors and panes");
+	if (!bad && by_formula(o))
+		count_curved(&job, stats);
+	if (!bad)
+		bad = matrix ? build_matrix(&job, whole, stats, sink, progress, e)
+		             : build_rows(&job, 1, whole, stats, sink, progress, e);
+	if (stats->rows[FF_DIFFUSE])
+		stats->mean_error /= (double)stats->rows[FF_DIFFUSE];
 	job_free(&job);
 	return bad ? -1 : 0;
 }

@@ -16,7 +16,9 @@ struct ff_options {
 	uint32_t emitter_gain;/* rays: this many times the rays for emitters */
 	uint32_t gather;      /* rays: that an element-side gathers with; 0: rows alone */
 	uint32_t lobe_rays;   /* rays spent on the G rows of a patch-side and lobe */
-	uint32_t depth;       /* longest chain of ideal events followed */
+	int centroid;         /* links as in the paper: a direction for each source */
+	uint32_t lobe_depth;  /* lobes in succession that light of a lobe is followed through */
+	uint32_t depth;       /* longest chain of events followed */
 	uint64_t seed;
 	double target;        /* analytic: absolute error of a partly hidden factor */
 	int evaluations;      /* analytic: the most spent on one */
@@ -30,7 +32,7 @@ struct ff_options {
 struct ff_stats {
 	double rays;          /* traced, all kinds */
 	double samples;       /* rays or pixels spent on diffuse rows */
-	size_t rows[4];       /* by kind */
+	size_t rows[FF_ROW_KINDS]; /* by kind */
 	size_t links, blocks, entries;
 	double worst_residual;/* largest |raw 1 - sum| of a row */
 	double mean_error;    /* mean and largest standard error of the diffuse rows */

@@ -12,6 +12,14 @@ static const double closure_slack = 1e-9;
 /* Directions are float32. */
 static const double unit_slack = 1e-3;
 
+static int not_negative_f32(const char *name, const float *v, size_t n, struct err *e)
+{
+	for (size_t i = 0; i < n; i++)
+		if (!(v[i] >= 0 && isfinite(v[i])))
+			return err_set(e, "array %s: value %zu is %g", name, i, (double)v[i]);
+	return 0;
+}
+
 static int not_negative(const char *name, const double *v, size_t n, struct err *e)
 {
 	for (size_t i = 0; i < n; i++)
@@ -57,6 +65,8 @@ static int check_chains(const struct ff *f, size_t materials, struct err *e)
 {
 	if (f->chains == 0)
 		return err_set(e, "array chain_start: there is no chain 0");
+	if (f->chain_most == 0)
+		return err_set(e, "array chain_most: it is 0");
 	if (check_starts("chain_start", f->chain_start, f->chains, f->chain_events, 0, e) ||
 	    check_below("chain_event", f->chain_event, f->chain_events, 4 * materials, e))
 		return -1;
@@ -84,19 +94,28 @@ static uint64_t chain_length(const struct ff *f, uint32_t chain)
 
 /* ---- rows and blocks ---- */
 
-static int check_row(const struct ff *f, size_t r, struct err *e)
+static size_t sources(const struct ff_scene *s)
 {
-	uint32_t patch = f->row_side[r] >> 1;
+	return 2 * s->patches + s->lights;
+}
 
-	if (patch < f->patch_begin || patch >= f->patch_end)
+static int check_row(const struct ff *f, const struct ff_scene *s, size_t r, struct err *e)
+{
+	uint32_t source = f->row_side[r], patch = source >> 1;
+
+	if (f->row_kind[r] >= FF_ROW_KINDS)
+		return err_set(e, "array row_kind: value %zu is %d", r, f->row_kind[r]);
+	if (f->row_kind[r] == FF_LIGHT && (patch < s->patches || source >= sources(s)))
+		return err_set(e, "array row_side: row %zu leaves source %" PRIu32 ", which is no "
+		               "light", r, source);
+	if (f->row_kind[r] != FF_LIGHT && (patch < f->patch_begin || patch >= f->patch_end))
 		return err_set(e, "array row_side: row %zu leaves patch %" PRIu32 ", which is not "
 		               "in this part", r, patch);
-	if (f->row_kind[r] > FF_TRANSMITTED)
-		return err_set(e, "array row_kind: value %zu is %d", r, f->row_kind[r]);
 	if (!(f->row_scale[r] > 0 && isfinite(f->row_scale[r])))
 		return err_set(e, "array row_scale: value %zu is %g", r, f->row_scale[r]);
 	if (!isfinite(f->row_residual[r]))
-		return err_set(e, "array row_residual: value %zu is %g", r, f->row_residual[r]);
+		return err_set(e, "array row_residual: value %zu is %g", r,
+		               (double)f->row_residual[r]);
 	return 0;
 }
 
@@ -116,22 +135,20 @@ static int check_row_chains(const struct ff *f, size_t r, struct err *e)
 	return 0;
 }
 
-static int check_rows(const struct ff *f, struct err *e)
+static int check_rows(const struct ff *f, const struct ff_scene *s, struct err *e)
 {
 	if (check_starts("row_block", f->row_block, f->rows, f->blocks, 1, e) ||
 	    check_starts("block_start", f->block_start, f->blocks, f->entries, 0, e) ||
-	    (f->block_column &&
-	     check_starts("block_column", f->block_column, f->blocks, f->columns, 0, e)) ||
 	    check_starts("block_arrival", f->block_arrival, f->blocks, f->arrivals, 0, e) ||
 	    check_below("block_chain", f->block_chain, f->blocks, f->chains, e) ||
-	    not_negative("row_error", f->row_error, f->rows, e) ||
+	    not_negative_f32("row_error", f->row_error, f->rows, e) ||
 	    not_negative("block_escape", f->block_escape, f->blocks, e) ||
 	    not_negative("block_black", f->block_black, f->blocks, e) ||
 	    not_negative("block_lost", f->block_lost, f->blocks, e) ||
 	    not_negative("block_cut", f->block_cut, f->blocks, e))
 		return -1;
 	for (size_t r = 0; r < f->rows; r++)
-		if (check_row(f, r, e) || check_row_chains(f, r, e))
+		if (check_row(f, s, r, e) || check_row_chains(f, r, e))
 			return -1;
 	return 0;
 }
@@ -175,36 +192,43 @@ static int check_span(const struct columns *c, uint64_t word, uint32_t first, ui
 	return 0;
 }
 
-static int check_spans(const struct columns *c, uint64_t b, struct err *e)
+static uint64_t words(const struct ff *f)
+{
+	return f->block_column ? f->columns : f->entries;
+}
+
+/* `left` values from word w on. */
+static int check_spans(const struct columns *c, uint64_t b, uint64_t w, uint64_t left,
+                       struct err *e)
 {
 	const struct ff *f = c->f;
-	uint64_t last = 0, left = f->block_start[b + 1] - f->block_start[b];
+	uint64_t last = 0;
 
-	if ((f->block_column[b + 1] - f->block_column[b]) % 2)
-		return err_set(e, "array block_column: block %" PRIu64 " has an odd number of words "
-		               "for spans", b);
-	for (uint64_t w = f->block_column[b]; w < f->block_column[b + 1]; w += 2) {
-		uint32_t count = f->column[w + 1];
-		if (check_span(c, w, f->column[w], count, &last, e))
+	for (; left; w += 2) {
+		if (words(f) - w < 2)
+			return err_set(e, "array block_column: block %" PRIu64 " ends beyond the last "
+			               "column", b);
+		uint32_t count = ff_word(f, w + 1);
+		if (check_span(c, w, ff_word(f, w), count, &last, e))
 			return -1;
 		if (count > left)
 			return err_set(e, "array column: value %" PRIu64 " is %" PRIu32 ", with which "
 			               "block %" PRIu64 " has more columns than values", w + 1, count, b);
 		left -= count;
 	}
-	if (left)
-		return err_set(e, "array column: block %" PRIu64 " has %" PRIu64 " values too many", b,
-		               left);
 	return 0;
 }
 
-static int check_list(const struct columns *c, uint64_t b, struct err *e)
+static int check_list(const struct columns *c, uint64_t b, uint64_t w, uint64_t n,
+                      struct err *e)
 {
-	const uint64_t *word = ff_block_column(c->f) + b;
 	uint64_t last = 0;
 
-	for (uint64_t w = word[0]; w < word[1]; w++)
-		if (check_span(c, w, c->f->column[w], 1, &last, e))
+	if (n > words(c->f) - w)
+		return err_set(e, "array block_column: block %" PRIu64 " ends beyond the last column",
+		               b);
+	for (uint64_t end = w + n; w < end; w++)
+		if (check_span(c, w, ff_word(c->f, w), 1, &last, e))
 			return -1;
 	return 0;
 }
@@ -212,12 +236,12 @@ static int check_list(const struct columns *c, uint64_t b, struct err *e)
 static int check_columns(const struct columns *c, uint64_t b, struct err *e)
 {
 	const struct ff *f = c->f;
-	const uint64_t *word = ff_block_column(f) + b;
+	uint64_t first = ff_first_word(f, b), n = f->block_start[b + 1] - f->block_start[b];
 
-	if (word[1] - word[0] > f->block_start[b + 1] - f->block_start[b])
-		return err_set(e, "array block_column: block %" PRIu64 " has more columns than values",
+	if (first > words(f))
+		return err_set(e, "array block_column: block %" PRIu64 " begins beyond the last column",
 		               b);
-	return ff_has_spans(f, b) ? check_spans(c, b, e) : check_list(c, b, e);
+	return ff_has_spans(f, b) ? check_spans(c, b, first, n, e) : check_list(c, b, first, n, e);
 }
 
 /* Finite values >= 0 that sum to *sum. */
@@ -303,18 +327,18 @@ static int link_order(const struct ff *f, size_t l)
 	return f->link_source[l] == FF_ANY;
 }
 
-static int check_links(const struct ff *f, size_t patches, struct err *e)
+static int check_links(const struct ff *f, const struct ff_scene *s, struct err *e)
 {
-	if (check_below("link_target", f->link_target, f->links, 2 * patches, e) ||
+	if (check_below("link_target", f->link_target, f->links, 2 * s->patches, e) ||
 	    check_below("link_chain", f->link_chain, f->links, f->chains, e) ||
 	    unit_vectors("link_direction", f->link_direction, f->links, e))
 		return -1;
 	for (size_t l = 0; l < f->links; l++) {
-		if (f->link_source[l] != FF_ANY && f->link_source[l] >= 2 * patches)
+		if (f->link_source[l] != FF_ANY && f->link_source[l] >= sources(s))
 			return err_set(e, "array link_source: value %zu is %" PRIu32, l,
 			               f->link_source[l]);
 		if (f->link_last[l] < f->link_source[l] ||
-		    (f->link_source[l] != FF_ANY && f->link_last[l] >= 2 * patches))
+		    (f->link_source[l] != FF_ANY && f->link_last[l] >= sources(s)))
 			return err_set(e, "array link_last: value %zu is %" PRIu32, l,
 			               f->link_last[l]);
 		if (l && !link_order(f, l))
@@ -338,9 +362,9 @@ static int check_part(const struct ff *f, size_t patches, struct err *e)
 int ff_check(const struct ff *f, const struct ff_scene *s, struct err *e)
 {
 	return check_scene(s, e) || check_part(f, s->patches, e) ||
-	       check_chains(f, s->materials, e) || check_rows(f, e) ||
+	       check_chains(f, s->materials, e) || check_rows(f, s, e) ||
 	       check_entries(f, s, e) ||
 	       check_below("arrival_target", f->arrival_target, f->arrivals, 2 * s->patches, e) ||
 	       unit_vectors("arrival_direction", f->arrival_direction, f->arrivals, e) ||
-	       check_links(f, s->patches, e) ? -1 : 0;
+	       check_links(f, s, e) ? -1 : 0;
 }

@@ -62,6 +62,8 @@ struct ff_job {
 	uint8_t *has_lobe;        /* [2P] light arriving here leaves by a finite lobe */
 	uint8_t *emits;           /* [2P] gives light of its own */
 	uint8_t *is_source;       /* [2P] any light leaves here */
+	uint32_t chain_most;      /* where counts of ideal events of a colour stop */
+	int has_panes, has_ideal; /* any clear pane; any ideal surface */
 	struct ff_samples of_rows, of_gathering;
 	struct tally_places places;
 	struct ff_gather gather;
@@ -97,19 +99,28 @@ struct ff_thread {
 	struct tally tally;
 	struct rng rng;
 	struct vec captures;      /* struct capture */
+	struct vec pairs;         /* struct capture */
 	int capturing;
 	double capture_weight;    /* of a capture, per weight of the ray */
+	uint32_t lobe_depth;      /* lobes that the row's light is followed through */
+	int bent_only;            /* landings of light that came straight are known */
+	double turned;            /* weight of the others, then */
 	struct capture now;       /* the sample being followed, while capturing */
 	struct hemicube cube;
 	uint32_t *item;           /* hemicube: [points][2 sides][pixels] of the patch */
 	struct view *view;        /* hemicube: [points][2 sides] */
 	double rays;
 	struct vec sights;        /* struct ff_sight */
+	struct vec lit;           /* struct lit, of the light in work */
 	struct exchanger *formula; /* NULL: nothing is computed by formula */
 	struct ff_batch_rays lobe; /* lobe rays waiting to be cast */
 	uint32_t lobes;
 	struct vec chain_map;     /* local -> whole */
 };
+
+/* Sets job->chain_most: as high as keeps chains few, by what a few rays meet. O(depth)
+ * rays. 0, or -1 and e. */
+int ff_find_chain_most(struct ff_job *j, struct err *e);
 
 /* Fills job->element. O(elements). */
 void ff_element_table(struct ff_job *j);
@@ -117,6 +128,13 @@ void ff_element_table(struct ff_job *j);
 /* A point on a patch, uniform by area, from two numbers in [0,1): its element and
  * position (on the surface, not moved off it). */
 uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, double x[3]);
+
+/* The scramble of a replicate of the rays of a row; row: twice its patch-side, and 1 more
+ * for its emission. */
+struct ff_scramble {
+	uint32_t seed[FF_DIMS];
+};
+struct ff_scramble ff_scramble(const struct ff_job *j, uint32_t row, uint32_t replicate);
 
 /* The numbers of rays first to first + n (n <= RAY_BATCH) of a scrambled replicate. */
 void ff_batch_numbers(const struct ff_samples *s, const uint32_t seed[4], uint32_t first,
@@ -145,6 +163,10 @@ void ff_batch_from_element(const struct ff_job *j, const struct ff_samples *s,
 
 /* Unit normal of a side of an element. */
 void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3]);
+
+/* Where a hit lies, from the triangle's corners, in doubles; clear of its edges by a few
+ * float32 steps of the scene, beyond which light would leave through the seam of a corner. */
+void ff_hit_point(const struct ff_job *j, const struct ray_hit *hit, double x[3]);
 
 /* Follows a ray (origin already off its surface) carrying weight w of the row's
  * flux to where it lands, and on through ideal surfaces; tallies everything. */
@@ -193,6 +215,20 @@ int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_w
 /* All rows of one patch into the batch. 0, or -1 and e. */
 int ff_patch_rays(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
 int ff_patch_hemicube(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
+
+/* The row of a punctual light into the batch; none if it has no flux. 0, or -1 and e.
+ * O(elements + rays). */
+int ff_light_row(struct ff_thread *t, uint32_t light, struct ff_batch *b, struct err *e);
+
+/* Captures the ways that light of all punctual lights comes straight to a directional
+ * patch-side. O(lights). 0, or -1 and e. */
+int ff_light_captures(struct ff_thread *t, uint32_t patch_side, struct err *e);
+
+/* 1 if a source gives light of its own. */
+static inline int ff_emits(const struct ff_job *j, uint32_t source)
+{
+	return source >= 2 * j->m->patches || j->emits[source];
+}
 
 /* Casts one lobe direction from a capture's point off a side. */
 typedef void ff_cast_fn(struct ff_thread *t, const struct capture *c, int side,

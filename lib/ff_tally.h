@@ -69,8 +69,9 @@ int tally_places_init(struct tally_places *p, const struct model *m, const uint8
                       struct err *e);
 void tally_places_free(struct tally_places *p);
 
+/* chain_most: see chain.h. */
 int tally_init(struct tally *t, const struct model *m, const struct tally_places *places,
-               const uint8_t *has_lobe, struct err *e);
+               const uint8_t *has_lobe, uint32_t chain_most, struct err *e);
 void tally_free(struct tally *t);
 
 static inline void tally_see(struct tally *t, uint32_t place)
@@ -116,7 +117,7 @@ void tally_replicate(struct tally *t);
 /* Appends the row to the batch and clears the tally. total: the weight that was
  * cast, from which the raw residual follows. The standard error comes from the
  * replicates where there are two or more, otherwise it is that of `samples`
- * random samples. O(hits + log) . 0, or -1 and e. */
+ * random samples; none (0) stands for exact values. O(hits + log) . 0, or -1 and e. */
 int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
                  enum ff_row_kind kind, uint32_t samples, double total, struct err *e);
 

@@ -1,13 +1,12 @@
 #include "seen.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "body_polygons.h"
 #include "vec3.h"
 
 /* Up to how many blockers that hide parts of a polygon what they hide is taken off, and
- * what they hide together added again; else it is cut up. */
+ * what they hide together added again; else it is cut up. Only where the measure is exact. */
 enum { OVERLAPS = 3 };
 
 /* Heights are rounded to this, by the size of what is multiplied. What is seen, too. */
@@ -223,14 +222,14 @@ static double visible(struct seer *s, const struct eye_polygon *p, const uint8_t
 		}
 		left[m++] = blockers[i];
 	}
-	while (m > OVERLAPS) {
+	while (m > s->overlaps) {
 		if (hidden_part(s, left[m - 1], across[m - 1], p, part)) {
 			s->hid = 1;
 			return piecewise(s, p, across[m - 1], left, m);
 		}
 		m--;
 	}
-	double whole = eye_polygon_factor(p, s->normal), sum = whole;
+	double whole = s->measure(p, s->arg), sum = whole;
 	for (int i = 0; i < m; i++)
 		if ((hidden = hidden_part(s, left[i], across[i], p, part))) {
 			s->hid = 1;
@@ -239,8 +238,8 @@ static double visible(struct seer *s, const struct eye_polygon *p, const uint8_t
 	return sum > rounding * whole ? sum : 0;
 }
 
-double seen(struct seer *s, const double x[3], const double normal[3], const struct facet *g,
-            uint64_t blockers, struct err *e)
+static double look(struct seer *s, const double x[3], const struct facet *g, uint64_t blockers,
+                   struct err *e)
 {
 	struct eye_polygon whole;
 	uint8_t list[SIGHT_BLOCKERS];
@@ -248,7 +247,6 @@ double seen(struct seer *s, const double x[3], const double normal[3], const str
 
 	s->evaluations++;
 	s->full = 0;
-	memcpy(s->normal, normal, sizeof s->normal);
 	eye_polygon_make(&whole, x, g->n, g->v);
 	s->reach = 0;
 	for (int i = 0; i < whole.n; i++)
@@ -267,4 +265,29 @@ double seen(struct seer *s, const double x[3], const double normal[3], const str
 		return sum;
 	err_set(e, "blockers cut a polygon into one of too many corners");
 	return NAN;
+}
+
+static double factor(const struct eye_polygon *p, void *normal)
+{
+	return eye_polygon_factor(p, normal);
+}
+
+double seen(struct seer *s, const double x[3], const double normal[3], const struct facet *g,
+            uint64_t blockers, struct err *e)
+{
+	double n[3] = { normal[0], normal[1], normal[2] };
+
+	s->measure = factor;
+	s->arg = n;
+	s->overlaps = OVERLAPS;
+	return look(s, x, g, blockers, e);
+}
+
+double seen_measured(struct seer *s, const double x[3], const struct facet *g, uint64_t blockers,
+                     seen_measure measure, void *arg, struct err *e)
+{
+	s->measure = measure;
+	s->arg = arg;
+	s->overlaps = 0;
+	return look(s, x, g, blockers, e);
 }

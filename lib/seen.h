@@ -22,6 +22,9 @@ struct outline_planes {
 	double size[OUTLINE_EDGES];   /* of the factors of each normal */
 };
 
+/* Something additive of polygons that an eye sees. */
+typedef double (*seen_measure)(const struct eye_polygon *p, void *arg);
+
 /* One thread's scratch space and the blockers. */
 struct seer {
 	struct blocker blocker[SIGHT_BLOCKERS];
@@ -29,7 +32,10 @@ struct seer {
 	int hid;                      /* set when a blocker hides something */
 	double evaluations;           /* so far */
 	/* The eye in work. */
-	double normal[3], reach;      /* of the farthest corner of what is looked at */
+	double reach;                 /* of the farthest corner of what is looked at */
+	seen_measure measure;
+	void *arg;
+	int overlaps;                 /* see seen.c */
 	int full;                     /* a polygon has too many corners */
 	struct outline outline[SIGHT_BLOCKERS];
 	struct outline_planes planes[SIGHT_BLOCKERS];
@@ -43,5 +49,9 @@ void seer_begin(struct seer *s, int blockers, double near);
  * polygons have too many corners. */
 double seen(struct seer *s, const double x[3], const double normal[3], const struct facet *g,
             uint64_t blockers, struct err *e);
+
+/* The same for any measure: its sum over convex polygons that are together what is seen. */
+double seen_measured(struct seer *s, const double x[3], const struct facet *g, uint64_t blockers,
+                     seen_measure measure, void *arg, struct err *e);
 
 #endif
