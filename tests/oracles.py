@@ -59,15 +59,17 @@ CLASSES = {
 MATRIX = ["-m", "analytic", "--to", "patches", "--precision", "f64"]
 ANALYTIC = ["-m", "analytic", "-n", "16384"]
 BEST = {
-    "furnace_mirror_mix":     (1,    1,    ["-m", "analytic", "-n", "262144"], ["-e", "1e-9"]),
+    "furnace_mirror_mix":     (1,    1,    ["-m", "analytic", "-n", "1048576", "--emitter-gain", "1"],
+                               ["-e", "1e-9"]),
     "furnace_phong_*":        (1,    1,    ["-m", "analytic", "-n", "65536", "--lobe-rays", "65536"],
                                ["-e", "1e-13"]),
     "furnace*":               (1/2,  1/2,  MATRIX, ["-e", "1e-12"]),
     "all_white_*":            (1/2,  1/2,  MATRIX, ["-e", "1e-12"]),
     "box_in_box_isolated":    (1/2,  1/2,  MATRIX, ["-e", "1e-12"]),
-    "infinite_plates_*":      (1,    1,    ["-m", "analytic", "-n", "65536", *LOBES], ["-e", "1e-9"]),
+    "*directional_part*":     (1,    1,    ["-m", "analytic", "-n", "65536", *LOBES], ["-e", "1e-9"]),
+    "infinite_plates_*":      (1,    1,    ["-m", "analytic", "-n", "1048576"], ["-e", "1e-9"]),
     "parallel_squares_*":     (1/32, 1/32, MATRIX, ["-e", "1e-9"]),
-    "emitter_diffuser_*":     (1/20, 1/20, MATRIX, ["-e", "1e-9"]),
+    "emitter_diffuser_*":     (1/48, 1/48, ["-m", "analytic", "--to", "patches"], ["-e", "1e-9"]),
     "cube_one_*":             (1/24, 1/24, MATRIX, ["-e", "1e-9"]),
     "*sphere*":               (1,    1,    ANALYTIC, ["-e", "1e-9"]),
     "facing_mirrors_*":       (1,    1,    ["-n", "4096"], ["-e", "1e-9"]),
@@ -138,11 +140,13 @@ class Field:
         self.name = [r["name"] for r in rows]
         self.side = np.array([side_of(r) for r in rows])
         self.element = np.array([int(r["element"]) for r in rows])
+        self.patch = np.array([int(r.get("patch", 0)) for r in rows])
         self.area = np.array([r["area"] for r in rows])
         self.h = np.array([r["H_0"] for r in rows])
         self.b = np.array([r.get("M_0", math.nan) + r.get("E_0", math.nan) for r in rows])
         self.error = error
         self.corners = corners
+        self.receiver = self.element
         self.runs = None  # H of independent runs [runs][rows], of particles
 
     def of(self, quantity):
@@ -159,23 +163,28 @@ def side_of(row):
     return {"front": 0, "back": 1, "f": 0, "b": 1, "0": 0, "1": 1}[s]
 
 
-def fitted_weights(corners, point):
-    """Weights of the nearest elements' means in the quadratic through them at a
-    point of their plane. corners: [n][3][3]; returns indices and weights."""
-    point = np.asarray(point, float)
-    distance = np.linalg.norm(corners.mean(1) - point, axis=1)
-    near = np.argsort(distance, kind="stable")[:48]
-    tri = corners[near]
-    u = tri[0, 1] - tri[0, 0]
+def fitted_weights(corners, receiver, point):
+    """Weights of the means of elements in the quadratic at a point of their plane that fits
+    the means of the nearest receivers best. corners: [n][3][3]; receiver: [n], what an
+    element got its value as a part of. Returns indices and weights."""
+    _, of = np.unique(receiver, return_inverse=True)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    share = area / np.bincount(of, area)[of]
+    sums = lambda values: np.stack([np.bincount(of, share * v) for v in values], 1)
+    distance = np.linalg.norm(sums(corners.mean(1).T) - np.asarray(point, float), axis=1)
+    nearest = np.argsort(distance, kind="stable")[:48 if len(distance) == len(of) else 25]
+    u = corners[0, 1] - corners[0, 0]
     u /= np.linalg.norm(u)
-    n = np.cross(u, tri[0, 2] - tri[0, 0])
+    n = np.cross(u, corners[0, 2] - corners[0, 0])
     v = np.cross(n / np.linalg.norm(n), u)
-    x, y = (tri - point) @ u, (tri - point) @ v
-    size = max(np.abs(x).max(), np.abs(y).max())
-    x, y = x / size, y / size
+    size = distance[nearest].max()
+    x, y = (corners - point) @ u / size, (corners - point) @ v / size
     mean = lambda a, b: (a.sum(1) * b.sum(1) + (a * b).sum(1)) / 12
-    basis = np.stack([np.ones(len(near)), x.mean(1), y.mean(1), mean(x, x), mean(x, y), mean(y, y)], 1)
-    return near, np.linalg.pinv(basis)[0]
+    basis = sums([np.ones(len(of)), x.mean(1), y.mean(1), mean(x, x), mean(x, y), mean(y, y)])[nearest]
+    weight = np.zeros(len(distance))
+    weight[nearest] = np.linalg.pinv(basis)[0]
+    near = np.flatnonzero(np.isin(of, nearest))
+    return near, weight[of[near]] * share[near]
 
 
 def error_of_b(field, rows, oracle):
@@ -203,7 +212,7 @@ def surface_value(oracle, method, e, field):
     if e["stat"] == "mean":
         w = field.area[rows] / field.area[rows].sum()
     elif e["stat"] == "point":
-        near, weights = fitted_weights(field.corners[rows], e["point"])
+        near, weights = fitted_weights(field.corners[rows], field.receiver[rows], e["point"])
         got, error, w = got[near], error[near], weights
         what += " " + e.get("label", ",".join(f"{c:g}" for c in e["point"]))
     else:
@@ -323,6 +332,8 @@ def evaluate(oracle, method, folder):
         run("ffcalc", path(".mesh"), "-o", path(".ff"), *options)
         run("shoot", path(".mesh"), path(".ff"), "-o", path(".rad"), *stop)
         field, ledger = chain_field(path(".rad"))
+        if "--to" in options:
+            field.receiver = field.patch
         return list(values_of(oracle, method, field, ledger, folder, path(".ff"), path(".rad")))
     except Failed as problem:
         return [Note(oracle["id"], method, str(problem), True)]
