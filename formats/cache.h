@@ -14,7 +14,7 @@
 #define REVISION_MESH "3"
 #define REVISION_FF "6"
 #define REVISION_RAD "6"
-#define REVISION_VIEW "1"
+#define REVISION_VIEW "3"
 
 /* Strings are owned (malloc) and may be NULL. */
 struct cache_info {

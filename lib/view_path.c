@@ -7,6 +7,7 @@
 #include "lobe.h"
 #include "rng.h"
 #include "vec3.h"
+#include "view_lights.h"
 #include "view_shade.h"
 
 /* Backs of one-sided materials in a row that a ray may pass. */
@@ -125,12 +126,23 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b, str
 		for (size_t i = 0; i < bands; i++)
 			diffuse[i] += b->weight[i] * s->across[i] * h[i];
 	}
-	if (!s->emits)
+	if (!s->emits || w->unlit)
 		return;
 	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] };
 	bsdf_emission(w->v->m, p->material, p->n, out, h);
 	for (size_t i = 0; i < bands; i++)
 		emission[i] += b->weight[i] * h[i];
+}
+
+/* Adds the highlights of punctual lights, which no ray of a lobe can meet. */
+static void add_highlights(struct view_walker *w, const struct view_branch *b,
+                           const struct point *p)
+{
+	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] }, l[BANDS_MAX];
+
+	view_highlights(w->v, p->material, p->x, p->n, out, l, &w->rays);
+	for (int i = 0; i < w->v->m->bands; i++)
+		w->directional[i] += b->weight[i] * l[i];
 }
 
 /* Puts a branch that carries `scale` times `coefficient` of b's weight on the
@@ -237,6 +249,8 @@ static void follow_branch(struct view_walker *w, const struct view_branch *b)
 	if (!s->reflected.coefficient && !s->transmitted.coefficient)
 		return;
 	locate(v, &p);
+	if (v->highlights)
+		add_highlights(w, b, &p);
 	if (s->reflected.coefficient)
 		branch_off(w, b, &p, &s->reflected, 0);
 	if (s->transmitted.coefficient)
@@ -248,7 +262,7 @@ void view_follow(struct view_walker *w, struct view_branch *b)
 	for (int i = 0; i < w->v->m->bands; i++)
 		b->weight[i] = 1;
 	b->depth = b->lobes = 0;
-	b->passes = 1;
+	b->passes = !w->unlit;
 	b->share = 1;
 	follow_branch(w, b);
 	while (w->waiting) {

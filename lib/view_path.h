@@ -24,6 +24,7 @@ struct view_side {
 
 struct view_scene {
 	const struct model *m;
+	const struct solution *s;
 	const struct ray_scene *rays;
 	enum view_method method;
 	struct reconstruction all;  /* irradiance by all paths; empty where it is not needed */
@@ -31,6 +32,7 @@ struct view_scene {
 	struct direct *direct;
 	struct view_side *side;     /* [2 materials] */
 	int tails;                  /* something reflects or transmits directionally */
+	int highlights;             /* there are punctual lights, and finite lobes */
 	double ceiling[BANDS_MAX];  /* no radiance along an unsampled tail exceeds it */
 };
 
@@ -63,6 +65,8 @@ struct view_walker {
 	const struct view_options *o;
 	struct view_shader *shader; /* for points whose light is to be computed; NULL: none is */
 	uint32_t pixel;             /* that it is told with them */
+	int unlit;                  /* emitters are black, and so are all backs of one-sided
+	                               materials: what gathering finds */
 	struct view_branch *stack;
 	size_t waiting;
 	double diffuse[BANDS_MAX], directional[BANDS_MAX], emission[BANDS_MAX];

@@ -63,6 +63,8 @@ static void find_ceiling(struct view_scene *v)
 	const struct model *m = v->m;
 	size_t bands = (size_t)m->bands;
 
+	for (size_t b = 0; b < bands && v->highlights; b++)
+		v->ceiling[b] = INFINITY;
 	for (size_t c = 0; c < 3 * m->elements; c++) {
 		size_t material = model_patch_material(m, m->element_patch[c / 3]);
 		for (int side = 0; side < 2; side++)
@@ -73,6 +75,11 @@ static void find_ceiling(struct view_scene *v)
 	}
 }
 
+static int is_finite(const struct view_lobe *lobe)
+{
+	return lobe->coefficient && !isinf(lobe->k);
+}
+
 static int tabulate(struct view_scene *v, struct err *e)
 {
 	size_t sides = 2 * v->m->material.n;
@@ -81,6 +88,8 @@ static int tabulate(struct view_scene *v, struct err *e)
 	for (size_t i = 0; v->side && i < sides; i++) {
 		tabulate_side(&v->m->material, i / 2, (int)(i % 2), &v->side[i]);
 		v->tails |= v->side[i].reflected.coefficient || v->side[i].transmitted.coefficient;
+		v->highlights |= v->m->light.n && (is_finite(&v->side[i].reflected) ||
+		                                   is_finite(&v->side[i].transmitted));
 	}
 	return v->side ? 0 : -1;
 }
@@ -88,9 +97,9 @@ static int tabulate(struct view_scene *v, struct err *e)
 /* All light is interpolated where it is not recomputed, and behind what blurs it. */
 static int interpolate(struct view_scene *v, const struct solution *s, int threads, struct err *e)
 {
-	static const unsigned kept[] = { PART_ALL, PART_CAUSTIC | PART_INDIRECT };
+	static const unsigned kept[] = { PART_ALL, PART_CAUSTIC | PART_INDIRECT, PART_CAUSTIC };
 
-	if ((v->method == VIEW_MESH || v->tails) &&
+	if ((v->method != VIEW_DIRECT || v->tails) &&
 	    reconstruct(v->m, s, PART_ALL, threads, &v->all, e))
 		return -1;
 	return v->method != VIEW_MESH &&
@@ -106,6 +115,7 @@ struct view_scene *view_scene_new(const struct model *m, const struct solution *
 	if (!v)
 		return NULL;
 	v->m = m;
+	v->s = s;
 	v->rays = rays;
 	v->method = method;
 	if (!tabulate(v, e) && !interpolate(v, s, threads, e) &&
