@@ -95,7 +95,7 @@ static int see(const struct view_scene *v, const double org[3], const double dir
 /* Has the rest of the light at a point computed and added later. */
 static void put_request(struct view_walker *w, const struct view_branch *b, struct point *p)
 {
-	struct view_request q = { .element = p->element, .side = p->side, .pixel = w->pixel,
+	struct view_request q = { .element = p->element, .side = p->side, .slot = w->slot,
 	                          .material = p->material, .directional = b->depth > 0,
 	                          .seed = b->seed + b->index };
 
@@ -119,12 +119,18 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b, str
 	if (computed && (s->diffuse || s->translucent))
 		put_request(w, b, p);
 	reconstruction_at(r, p->element, p->side, p->w, h);
-	for (size_t i = 0; i < bands; i++)
+	const float *miss = w->v->miss + (2 * (size_t)p->element + (size_t)p->side) * bands;
+	for (size_t i = 0; i < bands; i++) {
 		diffuse[i] += b->weight[i] * s->here[i] * h[i];
+		w->error[i] += b->weight[i] * s->here[i] * (double)miss[i];
+	}
 	if (s->translucent) {
 		reconstruction_at(r, p->element, !p->side, p->w, h);
-		for (size_t i = 0; i < bands; i++)
+		miss = w->v->miss + (2 * (size_t)p->element + (size_t)!p->side) * bands;
+		for (size_t i = 0; i < bands; i++) {
 			diffuse[i] += b->weight[i] * s->across[i] * h[i];
+			w->error[i] += b->weight[i] * s->across[i] * (double)miss[i];
+		}
 	}
 	if (!s->emits || w->unlit)
 		return;
