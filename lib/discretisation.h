@@ -17,9 +17,9 @@
 #include "solution.h"
 
 /* Scales s->error, all alike, down to what most elements differ by from their neighbours,
- * if that is less. Fills s->discretisation [2E][bands], in units of irradiance: root mean square over
- * the element-side. 0 where too few others of the same smooth surface touch it and its
- * neighbours, since nothing is known there. Light groups are summed. O(elements), the same
+ * if that is less. Fills s->discretisation [2E][bands], in units of irradiance: root mean
+ * square over the element-side. 0 where too few others of the same smooth surface touch
+ * it and its neighbours, since nothing is known there. Light groups are summed. O(elements), the same
  * for any number of threads. 0, or -1 and e. */
 int discretisation_estimate(const struct model *m, struct solution *s, int threads,
                             struct err *e);
