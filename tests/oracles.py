@@ -61,7 +61,7 @@ CLASSES = {
 MATRIX = ["-m", "analytic", "--to", "patches", "--precision", "f64"]
 ANALYTIC = ["-m", "analytic", "-n", "16384"]
 BEST = {
-    "furnace_mirror_mix":     (1,    1,    ["-m", "analytic", "-n", "1048576", "--emitter-gain", "1"],
+    "furnace_mirror_mix":     (1,    1,    ["-m", "analytic", "-n", "4194304", "--emitter-gain", "1"],
                                ["-e", "1e-9"]),
     "furnace_phong_*":        (1,    1,    ["-m", "analytic", "-n", "65536", "--lobe-rays", "65536"],
                                ["-e", "1e-13"]),
@@ -69,9 +69,10 @@ BEST = {
     "all_white_*":            (1/2,  1/2,  MATRIX, ["-e", "1e-12"]),
     "box_in_box_isolated":    (1/2,  1/2,  MATRIX, ["-e", "1e-12"]),
     "*directional_part*":     (1,    1,    ["-m", "analytic", "-n", "65536", *LOBES], ["-e", "1e-9"]),
-    "infinite_plates_*":      (1,    1,    ["-m", "analytic", "-n", "1048576"], ["-e", "1e-9"]),
+    "infinite_plates_mirr*":  (1,    1,    ["-m", "analytic", "-n", "1048576"], ["-e", "1e-9"]),
+    "infinite_plates_*":      (1,    1,    ["-m", "analytic", "-n", "4194304"], ["-e", "1e-9"]),
     "parallel_squares_*":     (1/32, 1/32, MATRIX, ["-e", "1e-9"]),
-    "emitter_diffuser_*":     (1/48, 1/48, ["-m", "analytic", "--to", "patches"], ["-e", "1e-9"]),
+    "emitter_diffuser_*":     (1/44, 1/44, ["-m", "analytic", "--to", "patches"], ["-e", "1e-9"]),
     "cube_one_*":             (1/24, 1/24, MATRIX, ["-e", "1e-9"]),
     "*sphere*":               (1,    1,    ANALYTIC, ["-e", "1e-9"]),
     "facing_mirrors_*":       (1,    1,    ["-n", "4096"], ["-e", "1e-9"]),
@@ -80,7 +81,7 @@ BEST = {
     "cie171_5.8_*":           (1/8,  1/8,  ANALYTIC, ["-e", "1e-9"]),
     "cie171_5.3_*":           (1/16, 1/32, ANALYTIC, ["-e", "1e-9"]),
     "cie":                    (1/16, 1/32, ANALYTIC, ["-e", "1e-9"]),
-    "cornell":                (1/32, 1/32, ["-n", "4096"], ["-e", "1e-6"]),
+    "cornell":                (1/64, 1/64, ["-n", "2048"], ["-e", "1e-6"]),
     "open_lobe_normaliser":   (1/8,  1/8,  ["-n", "16384", *LOBES], ["-e", "1e-9"]),
     "phong_to_mirror_*":      (1/4,  1/4,  ["-n", "65536", *LOBES], ["-e", "1e-9"]),
     "specular":               (1/4,  1/4,  ["-m", "analytic", "-n", "262144"], ["-e", "1e-9"]),
