@@ -224,6 +224,10 @@ int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_w
 
 /* All rows of one patch into the batch. 0, or -1 and e. */
 int ff_patch_rays(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
+/* Shares the light of patch-side ps, whose views are set and whose hemicubes are tallied,
+ * anew among elements that few pixels show. O(elements x points) rays. */
+void ff_share_pixels(struct ff_thread *t, uint32_t ps);
+
 int ff_patch_hemicube(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
 
 /* Finds job->mirror. O(triangles). 0, or -1 and e. */
