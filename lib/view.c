@@ -17,7 +17,7 @@ enum {
 };
 
 /* That shadow rays aim at, relative to direct light, where no error is asked for. */
-static const double usual_error = .01;
+static const double usual_error = .03;
 
 /* Variance of the mean of n samples that are stratified over a pixel over that of samples
  * which are not, divided by sqrt(n). Measured at edges, with 2 to 16 samples. */
@@ -459,7 +459,7 @@ static int failed(const struct render *r, struct err *e)
 	for (int t = 0; t < r->o->threads; t++)
 		if (r->worker[t].shader.e.set)
 			return err_set(e, "%s", r->worker[t].shader.e.text);
-	return 0;
+	return r->gather ? gather_check(r->gather, e) : 0;
 }
 
 int view_render(const struct view_scene *v, const struct view_frame *f,
