@@ -337,7 +337,7 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
               struct ff_stats *stats, const struct progress *progress, struct err *e)
 {
 	struct matrix m = { .job = j };
-	struct exchange_options o = { .relative = j->o.f64 ? 1e-9 : 4e-7, .absolute = j->o.target,
+	struct exchange_options o = { .relative = j->o.f64 ? 1e-9 : 8e-7, .absolute = j->o.target,
 	                              .most = j->o.evaluations, .bodies = SIGHT_BLOCKERS,
 	                              .crowd_rays = CROWD_RAYS };
 	size_t a = 0, b;
