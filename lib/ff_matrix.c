@@ -171,7 +171,8 @@ static void judge(struct matrix *m, size_t r, struct ff_rest *rest)
 	double area = m->area[m->first + r], sum = 0;
 
 	for (size_t j = 0; j < m->n; j++)
-		sum += get(m, r, j) / area;
+		sum += get(m, r, j);
+	sum /= area;
 	row->side = m->side[m->first + r];
 	row->residual = 1 - sum;
 	row->error = row->error / area + m->thread[0].x.o.relative * sum;
