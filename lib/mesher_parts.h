@@ -76,6 +76,12 @@ int imprint(struct model *m, double size, struct mesher_report *r, struct err *e
  * together with all triangles that share it. */
 int subdivide(struct model *m, double size, struct err *e);
 
+/* Divides the elements of a model further, element i at least halvings[i] times, and its
+ * neighbours where no edge would otherwise be halved. Replaces vertices, elements and split
+ * trees; (*origin)[e] = the element that the new one was part of, to be freed. */
+int subdivide_further(struct model *m, const uint8_t *halvings, uint32_t **origin,
+                      struct err *e);
+
 /* regions.c: sets region[t] of input triangles: connected pieces of one surface,
  * plane or bending by less than the cone at each edge. */
 struct region {
