@@ -82,6 +82,12 @@ int subdivide(struct model *m, double size, struct err *e);
 int subdivide_further(struct model *m, const uint8_t *halvings, uint32_t **origin,
                       struct err *e);
 
+/* adapt.c: how often each element is to be halved; fills what r says of it. `smallest` in
+ * metres. O(elements). */
+int adapt_plan(const struct model *m, const struct solution *s,
+               const struct mesher_refinement *how, double smallest, uint8_t *halvings,
+               struct mesher_report *r, struct err *e);
+
 /* regions.c: sets region[t] of input triangles: connected pieces of one surface,
  * plane or bending by less than the cone at each edge. */
 struct region {
@@ -118,6 +124,10 @@ int find_patches(const struct model *m, double size, double cos_cone, uint32_t *
 /* order.c: renumbers patches, elements and vertices along a Morton curve over
  * the scene's box and fills the patch arrays. */
 int order_model(struct model *m, const uint32_t *patch, size_t patches, struct err *e);
+
+/* The same for patches that keep their numbers; origin[element] moves with the elements. */
+int order_elements(struct model *m, const uint32_t *patch, size_t patches, uint32_t *origin,
+                   struct err *e);
 
 /* outline.c: the loops of planar patches. Needs model_derive. */
 int outline_patches(struct model *m, size_t *planar, struct err *e);

@@ -1,0 +1,177 @@
+/* Refinement where an earlier solution says that it pays. What an element adds to the
+ * squared error of what surfaces show, integrated over them, is its energy; an element more
+ * gains most where that is largest, so elements are halved until all have less than a
+ * common bound, the largest that makes the expected error small enough. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "mem.h"
+#include "mesher_parts.h"
+#include "vec3.h"
+
+/* What is left of an element's energy when it has been halved once: 1/4 in a smooth field,
+ * whose error is that of linear interpolation, and 1/sqrt(2) where a shadow's edge runs
+ * through it, whose length stays. Edges decide. */
+static const double left = .70710678118654752;
+
+enum {
+	HALVINGS_MAX = 4, /* in one step: to a quarter of the edge, as far as an estimate
+	                     made of whole elements can be trusted */
+	BISECTIONS = 40
+};
+
+struct plan {
+	const struct model *m;
+	double *energy;       /* [elements] */
+	uint8_t *most;        /* [elements] halvings that the least size leaves room for */
+	double allowed;       /* sum of energies that is asked for */
+	size_t elements;      /* and no more than so many elements */
+};
+
+/* Adds up the error of what one side shows, in units of irradiance: coefficients times the
+ * errors of both sides' irradiance, as if these were independent. */
+static double side_energy(const struct model *m, const struct solution *s, size_t element,
+                          int side)
+{
+	const struct materials *mt = &m->material;
+	uint32_t material = model_patch_material(m, m->element_patch[element]);
+	size_t bands = (size_t)m->bands, here = material_at(mt, material, side);
+	size_t there = material_at(mt, material, !side), es = 2 * element + (size_t)side;
+	double sum = 0;
+
+	for (size_t k = 0; k < bands; k++) {
+		double own = mt->rho_d[here + k] * s->discretisation[es * bands + k];
+		double across = mt->one_sided[material] ? 0 : mt->tau_d[there + k] *
+		                s->discretisation[(es ^ 1) * bands + k];
+		sum += own * own + across * across;
+	}
+	return m->element_area[element] * sum;
+}
+
+/* Energies, over the square of the mean exitance, and that an error of 1 would have. */
+static double find_energies(struct plan *p, const struct solution *s)
+{
+	const struct model *m = p->m;
+	double area = 0, sum = 0;
+
+	for (size_t i = 0; i < m->elements; i++)
+		for (int side = 0; side < 2; side++) {
+			if (!model_side_modelled(m, 2 * m->element_patch[i] + (uint32_t)side))
+				continue;
+			area += m->element_area[i];
+			p->energy[i] += side_energy(m, s, i, side);
+			for (int k = 0; k < m->bands; k++)
+				sum += m->element_area[i] *
+				       solution_exitance(m, s, 2 * i + (size_t)side, k);
+		}
+	double mean = area > 0 ? sum / area / m->bands : 0;
+	for (size_t i = 0; i < m->elements; i++)
+		p->energy[i] = mean > 0 ? p->energy[i] / (mean * mean) : 0;
+	return area * m->bands;
+}
+
+static double longest(const struct model *m, size_t element)
+{
+	double longest = 0, d[3];
+
+	for (size_t k = 0; k < 3; k++) {
+		v3_sub(&m->vertex[3 * (size_t)m->element[3 * element + (k + 1) % 3]],
+		       &m->vertex[3 * (size_t)m->element[3 * element + k]], d);
+		longest = fmax(longest, v3_length(d));
+	}
+	return longest;
+}
+
+static void find_room(struct plan *p, double smallest)
+{
+	for (size_t i = 0; i < p->m->elements; i++) {
+		double edge = longest(p->m, i);
+		while (p->most[i] < HALVINGS_MAX && edge >= smallest * sqrt(2) * (1 - 1e-9)) {
+			edge /= sqrt(2);
+			p->most[i]++;
+		}
+	}
+}
+
+/* Halvings of an element until each of its parts has no more than the bound. */
+static uint8_t halvings(const struct plan *p, size_t i, double bound)
+{
+	double energy = p->energy[i];
+	uint8_t n = 0;
+
+	for (; n < p->most[i] && energy > bound; n++)
+		energy *= left / 2;
+	return n;
+}
+
+/* What a bound leads to. */
+static double expect(const struct plan *p, double bound, size_t *elements)
+{
+	double sum = 0, kept[HALVINGS_MAX + 1] = { 1 };
+
+	for (int n = 0; n < HALVINGS_MAX; n++)
+		kept[n + 1] = kept[n] * left;
+	*elements = 0;
+	for (size_t i = 0; i < p->m->elements; i++) {
+		uint8_t n = halvings(p, i, bound);
+		sum += p->energy[i] * kept[n];
+		*elements += (size_t)1 << n;
+	}
+	return sum;
+}
+
+/* The largest bound that leaves no more than the allowed sum, or the least that does not
+ * take too many elements. */
+static double find_bound(const struct plan *p)
+{
+	double low = 0, high = 0;
+	size_t elements;
+
+	for (size_t i = 0; i < p->m->elements; i++)
+		high = fmax(high, p->energy[i]);
+	double least = ldexp(high, -BISECTIONS);
+	for (int i = 0; i < BISECTIONS; i++) {
+		double bound = sqrt(fmax(low, least) * high), sum = expect(p, bound, &elements);
+		if (sum <= p->allowed || elements > p->elements)
+			low = bound;
+		else
+			high = bound;
+	}
+	expect(p, low, &elements);
+	return elements > p->elements ? high : low;
+}
+
+static double total(const struct plan *p)
+{
+	double sum = 0;
+
+	for (size_t i = 0; i < p->m->elements; i++)
+		sum += p->energy[i];
+	return sum;
+}
+
+int adapt_plan(const struct model *m, const struct solution *s, const struct mesher_refinement *o,
+               double smallest, uint8_t *halving, struct mesher_report *r, struct err *e)
+{
+	struct plan p = { .m = m, .elements = o->elements };
+	size_t elements;
+
+	p.energy = mem_new(m->elements, sizeof *p.energy, "errors of elements", e);
+	p.most = mem_new(m->elements, sizeof *p.most, "errors of elements", e);
+	if (p.energy && p.most) {
+		double unit = find_energies(&p, s);
+		p.allowed = o->error * o->error * unit;
+		find_room(&p, smallest);
+		double sum = total(&p), bound = sum <= p.allowed ? INFINITY : find_bound(&p);
+		for (size_t i = 0; i < m->elements; i++) {
+			halving[i] = halvings(&p, i, bound);
+			r->marked += halving[i] > 0;
+		}
+		r->error_before = unit > 0 ? sqrt(sum / unit) : 0;
+		r->error_expected = unit > 0 ? sqrt(expect(&p, bound, &elements) / unit) : 0;
+	}
+	int status = p.energy && p.most ? 0 : -1;
+	free(p.energy);
+	free(p.most);
+	return status;
+}
