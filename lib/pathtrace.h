@@ -29,6 +29,7 @@ int pathtrace_diverges(const struct model *m);
 struct pathtrace_options {
 	long samples;      /* paths a pixel (at least 1), or particles in all (2) */
 	uint64_t seed;
+	int centre;        /* all paths begin at the pixel's centre */
 	int threads;
 };
 

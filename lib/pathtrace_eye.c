@@ -191,8 +191,10 @@ static void sample_pixel(const struct render *j, size_t pixel, long sample, doub
 		path.throughput[b] = 1;
 	for (int d = 0; d < 3; d++)
 		light[d] = rng_sobol(index, 2 + d, batch);
-	camera_ray(j->f, (double)(pixel % width) + rng_sobol(index, 0, batch),
-	           (double)(pixel / width) + rng_sobol(index, 1, batch), path.org, path.dir);
+	double x = j->o->centre ? .5 : rng_sobol(index, 0, batch);
+	double y = j->o->centre ? .5 : rng_sobol(index, 1, batch);
+	camera_ray(j->f, (double)(pixel % width) + x, (double)(pixel / width) + y, path.org,
+	           path.dir);
 	follow(j->p, &path, light, &r, radiance);
 }
 

@@ -391,18 +391,19 @@ static void run(struct job *j, int threads)
 	par_for(j->g.groups, CHUNK, threads, store_groups, j, NULL);
 }
 
-static int sum_parts(struct job *j, struct err *e)
+static int sum_parts(struct job *j, unsigned parts, struct err *e)
 {
 	const struct solution *s = j->s;
+	const double *part[] = { s->direct, s->caustic, s->indirect };
 	size_t n = s->element_sides * (size_t)s->bands;
 
 	j->h = mem_new(n, sizeof *j->h, "irradiance", e);
 	if (!j->h)
 		return -1;
 	for (size_t g = 0; g < s->groups; g++)
-		for (size_t i = 0; i < n; i++)
-			j->h[i] += s->direct[g * n + i] + s->caustic[g * n + i] +
-			           s->indirect[g * n + i];
+		for (int p = 0; p < 3; p++)
+			for (size_t i = 0; i < n && (parts >> p & 1); i++)
+				j->h[i] += part[p][g * n + i];
 	return 0;
 }
 
@@ -448,7 +449,7 @@ static void free_job(struct job *j, int threads)
 	smooth_groups_free(&j->g);
 }
 
-int reconstruct(const struct model *m, const struct solution *s, int threads,
+int reconstruct(const struct model *m, const struct solution *s, unsigned parts, int threads,
                 struct reconstruction *r, struct err *e)
 {
 	struct job j = { .m = m, .s = s, .out = r };
@@ -461,7 +462,7 @@ int reconstruct(const struct model *m, const struct solution *s, int threads,
 	if (m->elements <= SIZE_MAX / (6 * BANDS_MAX))
 		r->corner = mem_new(m->elements * 6 * (size_t)s->bands, sizeof *r->corner,
 		                    "irradiance at corners", e);
-	if (r->corner && !sum_parts(&j, e) && !smooth_groups_new(m, COS_CREASE, &j.g, e) &&
+	if (r->corner && !sum_parts(&j, parts, e) && !smooth_groups_new(m, COS_CREASE, &j.g, e) &&
 	    !new_values(&j, e) && !new_scratch(&j, threads, e)) {
 		run(&j, threads);
 		bad = 0;

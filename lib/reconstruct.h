@@ -29,9 +29,13 @@ struct reconstruction {
 	float *corner;  /* [elements][3][2 sides][bands] */
 };
 
-/* s->error may be NULL (exact values). Light groups are summed. O(elements), the
+/* Which parts of H are summed. */
+enum { PART_DIRECT = 1, PART_CAUSTIC = 2, PART_INDIRECT = 4, PART_ALL = 7 };
+
+/* Interpolates the sum of the parts of a mask. s->error, of the sum of all, stands for that
+ * of any; it may be NULL (exact values). Light groups are summed. O(elements), the
  * same result for any number of threads. 0, or -1 and e. */
-int reconstruct(const struct model *m, const struct solution *s, int threads,
+int reconstruct(const struct model *m, const struct solution *s, unsigned parts, int threads,
                 struct reconstruction *r, struct err *e);
 void reconstruction_free(struct reconstruction *r);
 

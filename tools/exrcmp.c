@@ -15,6 +15,7 @@
 static const struct cli_option options[] = {
 	{ 'l', "layer", "NAME", "compare the channels of layer NAME only" },
 	{ 'm', "max-rel", "X", "exit with 1 when the relative rmse is beyond X" },
+	{ 'x', "leave-out", "LIST", "leave out pixels that show: emitters,nothing" },
 	{ 'd', "heat", "FILE", "write the picture of the differences a - b to FILE" },
 	{ 'J', "json", NULL, "print JSON" },
 	{ 0, NULL, NULL, NULL }
@@ -25,6 +26,7 @@ struct options {
 	const char *layer, *heat;
 	double max_relative; /* negative: not given */
 	int json;
+	int no_emitters, no_nothing; /* pixels that are left out */
 };
 
 /* Channels that both pictures have. */
@@ -39,7 +41,25 @@ struct pictures {
 	struct image im[2];
 	struct exr_file_info info[2];
 	struct pairs pairs;
+	unsigned char *mask; /* of pixels that are left out, or NULL */
 };
+
+static void leave_out(const struct cli *c, struct options *o, const char *list)
+{
+	for (const char *p = list;; p++) {
+		size_t n = strcspn(p, ",");
+
+		if (n == strlen("emitters") && strncmp(p, "emitters", n) == 0)
+			o->no_emitters = 1;
+		else if (n == strlen("nothing") && strncmp(p, "nothing", n) == 0)
+			o->no_nothing = 1;
+		else
+			cli_usage(c, "--leave-out: '%s' is not a list of emitters, nothing", list);
+		p += n;
+		if (!*p)
+			break;
+	}
+}
 
 static void parse(struct cli *c, int argc, char **argv, struct options *o)
 {
@@ -51,6 +71,7 @@ static void parse(struct cli *c, int argc, char **argv, struct options *o)
 		case 'l': o->layer = optarg; break;
 		case 'm': o->max_relative = cli_number(c, "--max-rel", optarg, 0, INFINITY); break;
 		case 'd': o->heat = optarg; break;
+		case 'x': leave_out(c, o, optarg); break;
 		case 'J': o->json = 1; break;
 		}
 	}
@@ -118,11 +139,30 @@ static int read_pictures(const struct cli *c, const struct options *o, struct pi
 	return pair_channels(c, o, p, e);
 }
 
+/* Marks the pixels that are to be left out, as either picture tells. */
+static int make_mask(const struct options *o, struct pictures *p, struct err *e)
+{
+	const struct image *a = &p->im[0], *b = &p->im[1];
+
+	if (!o->no_emitters && !o->no_nothing)
+		return 0;
+	p->mask = mem_new((size_t)a->width * (size_t)a->height, 1, "mask", e);
+	if (!p->mask)
+		return -1;
+	if (o->no_emitters && (compare_mask_emitters(a, p->mask) & compare_mask_emitters(b, p->mask)))
+		return err_set(e, "%s: no layer tells where emitters are, nor in %s; "
+		               "use trace --layers emission", o->file[0], o->file[1]);
+	if (o->no_nothing && (compare_mask_nothing(a, p->mask) & compare_mask_nothing(b, p->mask)))
+		return err_set(e, "%s: no channel tells where nothing is seen, nor in %s; "
+		               "use trace --layers Z", o->file[0], o->file[1]);
+	return 0;
+}
+
 static void print_header(void)
 {
-	printf("%-16s %12s %12s %12s %12s %12s %12s %12s  %-12s %9s %9s\n", "channel", "rmse",
-	       "relative", "bias", "relative", "mean a", "mean b", "max", "at", "pixels",
-	       "left out");
+	printf("%-16s %12s %12s %12s %12s %12s %12s %12s  %-12s %9s %9s %9s %9s %9s\n", "channel",
+	       "rmse", "relative", "bias", "relative", "mean a", "mean b", "max", "at", "50 %",
+	       "95 %", "99 %", "pixels", "left out");
 }
 
 static void print_row(const char *name, const struct compare *d)
@@ -130,9 +170,10 @@ static void print_row(const char *name, const struct compare *d)
 	char at[32];
 
 	snprintf(at, sizeof at, "%d,%d", d->max_x, d->max_y);
-	printf("%-16s %12.6g %12.6g %12.6g %12.6g %12.6g %12.6g %12.6g  %-12s %9zu %9zu\n", name,
-	       d->rmse, d->relative_rmse, d->bias, d->relative_bias, d->mean_a, d->mean_b, d->max,
-	       d->pixels ? at : "-", d->pixels, d->left_out);
+	printf("%-16s %12.6g %12.6g %12.6g %12.6g %12.6g %12.6g %12.6g  %-12s %9.3g %9.3g %9.3g %9zu "
+	       "%9zu\n", name, d->rmse, d->relative_rmse, d->bias, d->relative_bias, d->mean_a,
+	       d->mean_b, d->max, d->pixels ? at : "-", d->percentile[0], d->percentile[1],
+	       d->percentile[2], d->pixels, d->left_out + d->excluded);
 }
 
 static json_t *number(double x)
@@ -142,12 +183,18 @@ static json_t *number(double x)
 
 static json_t *to_json(const struct compare *d)
 {
-	return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:[i,i], s:I, s:I}", "rmse",
+	json_t *j = json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:[i,i], s:I, s:I}", "rmse",
 	                 number(d->rmse), "relative_rmse", number(d->relative_rmse), "bias",
 	                 number(d->bias), "relative_bias", number(d->relative_bias), "mean_a",
 	                 number(d->mean_a), "mean_b", number(d->mean_b), "max", number(d->max),
 	                 "max_at", d->max_x, d->max_y, "pixels", (json_int_t)d->pixels, "left_out",
-	                 (json_int_t)d->left_out);
+	                 (json_int_t)(d->left_out + d->excluded));
+	for (int i = 0; i < COMPARE_PERCENTILES; i++) {
+		char name[32];
+		snprintf(name, sizeof name, "percentile_%d", compare_percentile[i]);
+		json_object_set_new(j, name, number(d->percentile[i]));
+	}
+	return j;
 }
 
 /* Compares, prints, and returns what --max-rel judges in *worst: the colours
@@ -164,7 +211,7 @@ static int compare_all(const struct options *o, const struct pictures *p,
 	if (!o->json)
 		print_header();
 	if (p->pairs.colours) {
-		compare_channels(a, p->pairs.rgb_a, b, p->pairs.rgb_b, 3, worst);
+		compare_channels(a, p->pairs.rgb_a, b, p->pairs.rgb_b, 3, p->mask, worst, e);
 		json_object_set_new(all, "rgb", to_json(worst));
 		if (!o->json)
 			print_row("RGB", worst);
@@ -172,7 +219,7 @@ static int compare_all(const struct options *o, const struct pictures *p,
 	for (int i = 0; i < p->pairs.n; i++) {
 		const char *name = a->name[p->pairs.a[i]];
 
-		compare_channels(a, &p->pairs.a[i], b, &p->pairs.b[i], 1, &d);
+		compare_channels(a, &p->pairs.a[i], b, &p->pairs.b[i], 1, p->mask, &d, e);
 		json_object_set_new(channels, name, to_json(&d));
 		if (!o->json)
 			print_row(name, &d);
@@ -212,9 +259,9 @@ static int judge(const struct cli *c, const struct options *o, const struct comp
 {
 	if (d->left_out)
 		cli_note(c, "%zu of %zu pixels are not finite in both pictures and were left out",
-		         d->left_out, d->left_out + d->pixels);
+		         d->left_out, d->left_out + d->excluded + d->pixels);
 	if (d->pixels == 0) {
-		cli_warn(c, "no pixel is finite in both pictures");
+		cli_warn(c, "no pixel is left that is finite in both pictures");
 		return 1;
 	}
 	if (o->max_relative < 0 || d->relative_rmse <= o->max_relative)
@@ -236,7 +283,7 @@ int main(int argc, char **argv)
 
 	parse(&c, argc, argv, &o);
 	cli_signals();
-	if (read_pictures(&c, &o, &p, &e) || compare_all(&o, &p, &worst, &e) ||
+	if (read_pictures(&c, &o, &p, &e) || make_mask(&o, &p, &e) || compare_all(&o, &p, &worst, &e) ||
 	    (o.heat && write_heat(&o, &p, argc, argv, &e)))
 		status = cli_fail(&c, &e);
 	else
@@ -247,5 +294,6 @@ int main(int argc, char **argv)
 	}
 	free(p.pairs.a);
 	free(p.pairs.b);
+	free(p.mask);
 	return cli_finish(&c, status);
 }

@@ -17,7 +17,7 @@
 #include "../lib/pathtrace.h"
 #include "common/cli.h"
 
-enum { OPT_SAMPLES = 256, OPT_SEED, OPT_IRRADIANCE, OPT_COMPRESSION };
+enum { OPT_SAMPLES = 256, OPT_SEED, OPT_IRRADIANCE, OPT_COMPRESSION, OPT_CENTRE };
 enum { PICTURE_SAMPLES = 64, PARTICLES = 1000000 };
 
 static const struct cli_option option_table[] = {
@@ -26,6 +26,7 @@ static const struct cli_option option_table[] = {
 	{ 's', "size", "WxH", "pixels (default: 640 wide, height from the camera's aspect)" },
 	{ OPT_IRRADIANCE, "irradiance", NULL, "irradiance of all element-sides by particles" },
 	{ OPT_SAMPLES, "samples", "N", "paths in each pixel (default: 64), or particles (1000000)" },
+	{ OPT_CENTRE, "centre", NULL, "sample each pixel at its centre, as trace --samples 1 does" },
 	{ OPT_SEED, "seed", "N", "start of the random numbers (default: 1)" },
 	{ OPT_COMPRESSION, "compression", "METHOD", "zip (default), zips, piz, rle or none" },
 	{ 0, NULL, NULL, NULL }
@@ -76,6 +77,7 @@ static void take_option(struct reference *r, int letter)
 		r->o.samples = cli_integer(c, "--samples", optarg, 1, 1000000000000);
 		break;
 	case OPT_SEED: r->o.seed = (uint64_t)cli_integer(c, "--seed", optarg, 0, INT64_MAX); break;
+	case OPT_CENTRE: r->o.centre = 1; break;
 	case OPT_COMPRESSION: compression(r, optarg); break;
 	}
 }
@@ -92,6 +94,8 @@ static void parse(struct reference *r, int argc, char **argv)
 	r->mesh = argv[optind];
 	if (r->irradiance && (r->camera || r->width))
 		cli_usage(c, "--irradiance has no camera and no size");
+	if (r->irradiance && r->o.centre)
+		cli_usage(c, "--irradiance has no pixels to sample at their centres");
 	if (!r->output && !r->irradiance)
 		cli_usage(c, "-o is needed: the picture to write");
 	if (!r->output)
@@ -110,7 +114,7 @@ static void parse(struct reference *r, int argc, char **argv)
 static void picture_key(struct reference *r, const char *content)
 {
 	const int64_t number[] = { r->frame.width, r->frame.height, r->o.samples,
-		(int64_t)r->o.seed, (int64_t)r->exr.compression };
+		(int64_t)r->o.seed, (int64_t)r->exr.compression, r->o.centre };
 	struct digest *d = digest_new();
 	char camera[33];
 

@@ -302,7 +302,7 @@ static int read_scene(struct trace *t, int argc, char **argv, struct err *e)
 	if (!t->history || !t->rays)
 		return -1;
 	double built = cli_seconds();
-	if (reconstruct(&t->m, &t->s, t->view.threads, &t->h, e))
+	if (reconstruct(&t->m, &t->s, PART_ALL, t->view.threads, &t->h, e))
 		return -1;
 	t->scene = view_scene_new(&t->m, t->rays, &t->h, e);
 	double ready = cli_seconds();

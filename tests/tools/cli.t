@@ -65,6 +65,7 @@ trace --eye 0,0 --target 1,1,1 any.rad
 reference --samples 0 -c a any.mesh
 END
 refuses 2 "^exrcmp: " "exrcmp with one picture: exit 2" exrcmp one.exr
+refuses 2 "^exrcmp: --leave-out" "exrcmp -x lamps: exit 2" exrcmp -x lamps a.exr b.exr
 refuses 2 "^inspect: " "inspect --row x: exit 2" inspect --row x any.ff
 
 done_testing

@@ -20,6 +20,14 @@ static void two_images(struct image *a, struct image *b)
 	assert_int_equal(image_new(b, 4, 2, 3, names, &e), 0);
 }
 
+static void compare(const struct image *a, const int *channel, const struct image *b, int n,
+                    const unsigned char *mask, struct compare *d)
+{
+	struct err e = { 0 };
+
+	assert_int_equal(compare_channels(a, channel, b, channel, n, mask, d, &e), 0);
+}
+
 static void near(double got, double expected)
 {
 	if (!(fabs(got - expected) <= 1e-14 * fabs(expected)))
@@ -33,7 +41,7 @@ static void test_equal(void **state)
 
 	(void)state;
 	two_images(&a, &b);
-	compare_channels(&a, rgb, &b, rgb, 3, &d);
+	compare(&a, rgb, &b, 3, NULL, &d);
 	assert_int_equal(d.pixels, 8);
 	assert_true(d.rmse == 0 && d.relative_rmse == 0 && d.bias == 0 && d.relative_bias == 0);
 	assert_true(d.max == 0 && d.max_x == 0 && d.max_y == 0);
@@ -52,14 +60,14 @@ static void test_numbers(void **state)
 		b.pixel[i] = 2;
 	for (int i = 0; i < 24; i++)
 		a.pixel[i] = i == 6 ? 5.f : i == 8 + 6 ? -2.f : 2.f;
-	compare_channels(&a, red, &b, red, 1, &d);
+	compare(&a, red, &b, 1, NULL, &d);
 	near(d.mean_a, 19. / 8);
 	near(d.mean_b, 2);
 	near(d.bias, 3. / 8);
 	near(d.relative_bias, 3. / 16);
 	near(d.rmse, sqrt(9. / 8));
 	near(d.relative_rmse, sqrt(9. / 8) / 2);
-	compare_channels(&a, rgb, &b, rgb, 3, &d);
+	compare(&a, rgb, &b, 3, NULL, &d);
 	near(d.rmse, sqrt(25. / 24));
 	near(d.bias, -1. / 24);
 	near(d.max, 4);
@@ -78,14 +86,14 @@ static void test_not_finite(void **state)
 	two_images(&a, &b);
 	a.pixel[0] = NAN;
 	b.pixel[8 + 1] = INFINITY;
-	compare_channels(&a, rgb, &b, rgb, 3, &d);
+	compare(&a, rgb, &b, 3, NULL, &d);
 	assert_int_equal(d.pixels, 6);
 	assert_int_equal(d.left_out, 2);
-	compare_channels(&a, red, &b, red, 1, &d);
+	compare(&a, red, &b, 1, NULL, &d);
 	assert_int_equal(d.pixels, 7);
 	for (int i = 0; i < 8; i++)
 		a.pixel[i] = -INFINITY;
-	compare_channels(&a, rgb, &b, rgb, 3, &d);
+	compare(&a, rgb, &b, 3, NULL, &d);
 	assert_int_equal(d.pixels, 0);
 	assert_int_equal(d.left_out, 8);
 	assert_true(d.rmse == 0 && d.max_x == -1);
@@ -101,11 +109,82 @@ static void test_black_yardstick(void **state)
 	(void)state;
 	two_images(&a, &b);
 	a.pixel[3] = -1;
-	compare_channels(&a, rgb, &b, rgb, 3, &d);
+	compare(&a, rgb, &b, 3, NULL, &d);
 	assert_true(isinf(d.relative_rmse) && d.relative_rmse > 0);
 	assert_true(isinf(d.relative_bias) && d.relative_bias < 0);
 	image_free(&a);
 	image_free(&b);
+}
+
+/* 100 pixels with errors of 1 to 100 per mille, against hand counts. */
+static void test_percentiles(void **state)
+{
+	static const char *const one[] = { "R" };
+	unsigned char mask[100] = { 0 };
+	struct image a, b;
+	struct compare d;
+	struct err e = { 0 };
+
+	(void)state;
+	assert_int_equal(image_new(&a, 10, 10, 1, one, &e), 0);
+	assert_int_equal(image_new(&b, 10, 10, 1, one, &e), 0);
+	for (int i = 0; i < 100; i++) {
+		b.pixel[i] = -1000;
+		a.pixel[i] = b.pixel[i] + (float)(1 + (37 * i) % 100) * (i % 2 ? 1 : -1);
+	}
+	compare(&a, red, &b, 1, NULL, &d);
+	for (int i = 0; i < COMPARE_PERCENTILES; i++)
+		assert_true(fabs(d.percentile[i] - compare_percentile[i] * 1e-3) < 1e-7);
+	for (int i = 0; i < 100; i++)
+		mask[i] = 1 + (37 * i) % 100 > 10;
+	compare(&a, red, &b, 1, mask, &d);
+	assert_int_equal(d.pixels, 10);
+	assert_int_equal(d.excluded, 90);
+	assert_true(fabs(d.percentile[0] - .005) < 1e-7 && fabs(d.percentile[2] - .01) < 1e-7);
+	image_free(&a);
+	image_free(&b);
+}
+
+/* The relative error of a pixel is that of its colour as a vector. */
+static void test_colour_error(void **state)
+{
+	struct image a, b;
+	struct compare d;
+
+	(void)state;
+	two_images(&a, &b);
+	for (int i = 0; i < 8; i++) {
+		b.pixel[i] = 3, b.pixel[8 + i] = 0, b.pixel[16 + i] = 4;
+		a.pixel[i] = 3, a.pixel[8 + i] = .3f, a.pixel[16 + i] = 4.4f;
+	}
+	compare(&a, rgb, &b, 3, NULL, &d);
+	assert_true(fabs(d.percentile[0] - .1) < 1e-7 && fabs(d.percentile[2] - .1) < 1e-7);
+	image_free(&a);
+	image_free(&b);
+}
+
+static void test_masks(void **state)
+{
+	static const char *const many[] = { "emission.R", "emission.G", "emission.B", "Z" };
+	unsigned char mask[8] = { 0 };
+	struct image im;
+	struct err e = { 0 };
+
+	(void)state;
+	assert_int_equal(image_new(&im, 4, 2, 4, many, &e), 0);
+	im.pixel[8 + 3] = 1;
+	im.pixel[24 + 5] = INFINITY;
+	assert_int_equal(compare_mask_emitters(&im, mask), 0);
+	for (int i = 0; i < 8; i++)
+		assert_int_equal(mask[i], i == 3);
+	assert_int_equal(compare_mask_nothing(&im, mask), 0);
+	for (int i = 0; i < 8; i++)
+		assert_int_equal(mask[i], i == 3 || i == 5);
+	image_free(&im);
+	assert_int_equal(image_new(&im, 4, 2, 3, names, &e), 0);
+	assert_int_equal(compare_mask_emitters(&im, mask), -1);
+	assert_int_equal(compare_mask_nothing(&im, mask), -1);
+	image_free(&im);
 }
 
 static void test_difference(void **state)
@@ -165,6 +244,9 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_equal),           cmocka_unit_test(test_numbers),
 		cmocka_unit_test(test_not_finite),      cmocka_unit_test(test_black_yardstick),
+		cmocka_unit_test(test_percentiles),
+		cmocka_unit_test(test_colour_error),
+		cmocka_unit_test(test_masks),
 		cmocka_unit_test(test_difference),      cmocka_unit_test(test_layers),
 		cmocka_unit_test(test_empty_image),
 	};

@@ -40,7 +40,7 @@ static void run(const struct model *m, const struct solution *s, int threads,
                 struct reconstruction *r)
 {
 	struct err e = { 0 };
-	assert_int_equal(reconstruct(m, s, threads, r, &e), 0);
+	assert_int_equal(reconstruct(m, s, PART_ALL, threads, r, &e), 0);
 }
 
 static double worst(const struct model *m, const struct reconstruction *r,

@@ -29,7 +29,7 @@ static void stage_end(struct stage *t, double h)
 
 	grid_end(&t->m);
 	grid_solution(&t->m, h, &t->s);
-	assert_int_equal(reconstruct(&t->m, &t->s, 1, &t->h, &e), 0);
+	assert_int_equal(reconstruct(&t->m, &t->s, PART_ALL, 1, &t->h, &e), 0);
 	assert_non_null(t->rays = ray_scene_new(&t->m, &e));
 	assert_non_null(t->view = view_scene_new(&t->m, t->rays, &t->h, &e));
 }
@@ -284,7 +284,7 @@ static void test_sides(void **state)
 	for (size_t i = 0; i < 8; i++) /* the wall: H front 2, back 3 */
 		t.s.indirect[2 * i] = 2, t.s.indirect[2 * i + 1] = 3;
 	reconstruction_free(&t.h);
-	assert_int_equal(reconstruct(&t.m, &t.s, 1, &t.h, &e), 0);
+	assert_int_equal(reconstruct(&t.m, &t.s, PART_ALL, 1, &t.h, &e), 0);
 	/* Front: rho_s = 0 there, tau_s of the back; the lamp below shines through. */
 	double front = .5 + (.1 * 2 + .25 * 3) / PI + .05 * 20;
 	assert_true(fabs(look(&t, &o, .1, .2, 1, .3, .1, 0) - front) < 1e-5);
