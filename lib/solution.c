@@ -40,6 +40,7 @@ int solution_check(const struct model *m, const struct solution *s, struct err *
 	       check_numbers("irradiance_caustic", s->caustic, s->groups * sides, 0, e) ||
 	       check_numbers("irradiance_indirect", s->indirect, s->groups * sides, 0, e) ||
 	       check_numbers("irradiance_error", s->error, sides, 0, e) ||
+	       check_numbers("irradiance_discretisation", s->discretisation, sides, 0, e) ||
 	       check_numbers("unshot_emission", s->unshot_emission, s->patch_sides * bands, 1,
 	                     e) ||
 	       check_numbers("unshot_diffuse", s->unshot_diffuse, s->patch_sides * bands, 1,
@@ -64,10 +65,29 @@ double solution_mean_error(const struct model *m, const struct solution *s)
 	return all > 0 ? error / all : 0;
 }
 
+double solution_relative_rms(const struct model *m, const struct solution *s,
+                             const double *x)
+{
+	size_t bands = (size_t)s->bands;
+	double square = 0, all = 0, area = 0;
+
+	for (size_t es = 0; es < s->element_sides; es++) {
+		double a = m->element_area[es >> 1];
+		if (!model_side_modelled(m, 2 * m->element_patch[es >> 1] + (uint32_t)(es & 1)))
+			continue;
+		for (size_t k = 0; k < bands; k++) {
+			square += a * x[es * bands + k] * x[es * bands + k];
+			all += a * solution_irradiance(s, es, (int)k);
+			area += a;
+		}
+	}
+	return all > 0 ? sqrt(square * area) / all : 0;
+}
+
 void solution_free(struct solution *s)
 {
-	double *array[] = { s->direct, s->caustic, s->indirect, s->error, s->unshot_emission,
-		s->unshot_diffuse, s->unshot_link, s->shot, s->ledger };
+	double *array[] = { s->direct, s->caustic, s->indirect, s->error, s->discretisation,
+		s->unshot_emission, s->unshot_diffuse, s->unshot_link, s->shot, s->ledger };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);

@@ -17,6 +17,8 @@ struct solution {
 	double *indirect;          /* the rest */
 	double *error;             /* [2E][bands] standard error of their sum from
 	                              the form factors' sampling */
+	double *discretisation;    /* [2E][bands] estimated root mean square, over the
+	                              element, of what interpolation misses of their sum */
 
 	/* The solver's state, for shoot --resume: what is still to be shot, what each
 	 * row has sent so far, where the rest went. */
@@ -58,6 +60,11 @@ int solution_check(const struct model *m, const struct solution *s, struct err *
 /* Area-weighted mean standard error of irradiance over the mean irradiance of the
  * modelled sides; 0 in the dark. */
 double solution_mean_error(const struct model *m, const struct solution *s);
+
+/* Root mean square over the area of the modelled sides, and over bands, of x[2E][bands],
+ * over their mean irradiance; 0 in the dark. */
+double solution_relative_rms(const struct model *m, const struct solution *s,
+                             const double *x);
 
 void solution_free(struct solution *s);
 

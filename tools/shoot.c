@@ -13,6 +13,7 @@
 #include "../formats/history.h"
 #include "../formats/mesh_file.h"
 #include "../formats/rad_file.h"
+#include "../lib/discretisation.h"
 #include "../lib/mem.h"
 #include "../lib/radiosity.h"
 #include "common/cli.h"
@@ -245,7 +246,8 @@ static int solve(struct job *j, struct err *e)
 	if (bad)
 		return -1;
 	t2 = cli_seconds();
-	if (radiosity_gather(&j->s, &j->t, j->cli->threads, &j->report, e))
+	if (radiosity_gather(&j->s, &j->t, j->cli->threads, &j->report, e) ||
+	    discretisation_estimate(&j->m, &j->s, j->cli->threads, e))
 		return -1;
 	j->prepare_seconds = t1 - t0;
 	j->solve_seconds = t2 - t1;
@@ -275,11 +277,13 @@ static char *report_text(const struct job *j)
 			json_array_append_new(band, json_real(j->s.ledger[term * j->s.bands + k]));
 		json_object_set_new(ledger, term_name[term], band);
 	}
-	o = json_pack("{s:o, s:I, s:i, s:f, s:o, s:f, s:o, s:f}", "ledger", ledger,
+	o = json_pack("{s:o, s:I, s:i, s:f, s:o, s:f, s:o, s:f, s:f, s:f}", "ledger", ledger,
 	              "shots", (json_int_t)j->s.shots, "components", r->components,
 	              "unshot", r->unshot, "truncation_bound", number(r->bound),
 	              "guessed_directions", r->guessed, "ledger_residual", number(r->residual),
-	              "mean_error", solution_mean_error(&j->m, &j->s));
+	              "mean_error", solution_mean_error(&j->m, &j->s),
+	              "sampling", solution_relative_rms(&j->m, &j->s, j->s.error),
+	              "discretisation", solution_relative_rms(&j->m, &j->s, j->s.discretisation));
 	text = json_dumps(o, JSON_COMPACT);
 	json_decref(o);
 	return text;
@@ -307,8 +311,11 @@ static void print_report(const struct job *j)
 		       r->bound);
 	else
 		fprintf(out, "truncation    no finite bound\n");
-	fprintf(out, "sampling      %.3g relative standard error of irradiance, mean over area\n",
-	       solution_mean_error(&j->m, s));
+	fprintf(out, "sampling      %.3g relative standard error of irradiance, mean over area; "
+	        "%.3g rms\n", solution_mean_error(&j->m, s),
+	        solution_relative_rms(&j->m, s, s->error));
+	fprintf(out, "elements      %.3g relative error of irradiance between elements "
+	        "(estimate), rms over area\n", solution_relative_rms(&j->m, s, s->discretisation));
 	if (r->guessed > 0)
 		fprintf(out, "directions    %.3g of what is emitted used the nearest known direction\n",
 		       r->guessed);

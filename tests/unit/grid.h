@@ -112,6 +112,7 @@ static inline void grid_solution_free(struct solution *s)
 	free(s->caustic);
 	free(s->indirect);
 	free(s->error);
+	free(s->discretisation);
 }
 
 #endif

@@ -1,0 +1,224 @@
+#include "discretisation.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "mem.h"
+#include "par.h"
+#include "smooth.h"
+#include "vec3.h"
+
+/* As in interpolation: cos 30 degrees. */
+static const double cos_crease = .86602540378443865;
+
+/* The error of linear interpolation (root mean square over an element) over the second
+ * difference, where that is the same all around, as in a curved field, and over its
+ * variation, as at steps: as it is for such fields on jittered grids. */
+static const double error_by_curvature = 1. / 3, error_by_roughness = 1.7;
+
+enum { NEAR_MAX = 64, CHUNK = 256 };
+
+struct near {
+	uint32_t element;
+	int shared;           /* vertices */
+	double x, y, w;       /* centroid in the tangent plane; weight */
+};
+
+struct job {
+	const struct model *m;
+	struct solution *s;
+	struct smooth_groups g;
+	double *h;            /* [2E][bands] irradiance */
+	double *difference;   /* [2E][bands] second difference; NAN: not determined */
+	double *noise;        /* [2E][bands] its variance by the standard errors */
+};
+
+/* Elements of the same smooth surface that share `corners` vertices or more with e, by
+ * place. */
+static size_t list_near(const struct job *j, size_t e, int corners, struct near *near)
+{
+	size_t n = 0, kept = 0;
+
+	for (size_t k = 0; k < 3; k++) {
+		uint32_t group = j->g.group[3 * e + k];
+		for (uint32_t q = j->g.start[group]; q < j->g.start[group + 1]; q++) {
+			uint32_t other = j->g.corner[q] / 3;
+			size_t i = 0;
+			while (i < n && near[i].element != other)
+				i++;
+			if (other == e || (i == n && n == NEAR_MAX))
+				continue;
+			if (i == n)
+				near[n++] = (struct near){ .element = other };
+			near[i].shared++;
+		}
+	}
+	for (size_t i = 0; i < n; i++)
+		if (near[i].shared >= corners)
+			near[kept++] = near[i];
+	return kept;
+}
+
+static void centroid(const struct model *m, size_t e, double c[3])
+{
+	memset(c, 0, 3 * sizeof *c);
+	for (size_t k = 0; k < 3; k++)
+		v3_mad(c, 1. / 3, &m->vertex[3 * (size_t)m->element[3 * e + k]], c);
+}
+
+static void place(const struct model *m, size_t e, struct near *near, size_t n)
+{
+	double at[3], t[3], b[3], sum = 0;
+
+	centroid(m, e, at);
+	v3_frame(&m->element_normal[3 * e], t, b);
+	for (size_t i = 0; i < n; i++) {
+		double c[3];
+		centroid(m, near[i].element, c);
+		v3_sub(c, at, c);
+		near[i].x = v3_dot(c, t);
+		near[i].y = v3_dot(c, b);
+		near[i].w = m->element_area[near[i].element];
+		sum += near[i].w;
+	}
+	for (size_t i = 0; i < n; i++)
+		near[i].w = sum > 0 ? near[i].w / sum : 1. / (double)n;
+}
+
+/* Turns weights into those of the least-squares plane's value at the origin: their sum
+ * is 1 and first moments 0. 0 if the elements do not span a plane. */
+static int fit_weights(struct near *near, size_t n)
+{
+	double mx = 0, my = 0, xx = 0, xy = 0, yy = 0;
+
+	for (size_t i = 0; i < n; i++) {
+		mx += near[i].w * near[i].x;
+		my += near[i].w * near[i].y;
+	}
+	for (size_t i = 0; i < n; i++) {
+		double x = near[i].x - mx, y = near[i].y - my;
+		xx += near[i].w * x * x;
+		xy += near[i].w * x * y;
+		yy += near[i].w * y * y;
+	}
+	double det = xx * yy - xy * xy, trace = xx + yy;
+	if (n < 3 || !(det > 1e-3 * trace * trace))
+		return 0;
+	for (size_t i = 0; i < n; i++) {
+		double x = near[i].x - mx, y = near[i].y - my;
+		near[i].w *= 1 - (mx * (yy * x - xy * y) + my * (xx * y - xy * x)) / det;
+	}
+	return 1;
+}
+
+/* The elements that predict e, with their weights: those at its edges if they surround
+ * it, else all that touch it. 0 if none do. */
+static size_t stencil(const struct job *j, size_t e, struct near *near)
+{
+	for (int corners = 2; corners > 0; corners--) {
+		size_t n = list_near(j, e, corners, near);
+		if (corners == 2 && n < 3)
+			continue;
+		place(j->m, e, near, n);
+		if (fit_weights(near, n))
+			return n;
+	}
+	return 0;
+}
+
+static void differences(void *arg, size_t begin, size_t end, int thread)
+{
+	const struct job *j = arg;
+	size_t channels = 2 * (size_t)j->s->bands;
+	struct near near[NEAR_MAX];
+
+	(void)thread;
+	for (size_t e = begin; e < end; e++) {
+		size_t n = stencil(j, e, near);
+		for (size_t c = 0; c < channels; c++) {
+			double error = j->s->error[e * channels + c], d = j->h[e * channels + c];
+			double noise = error * error;
+			for (size_t i = 0; i < n; i++) {
+				size_t at = near[i].element * channels + c;
+				error = near[i].w * j->s->error[at];
+				d -= near[i].w * j->h[at];
+				noise += error * error;
+			}
+			j->difference[e * channels + c] = n ? d : (double)NAN;
+			j->noise[e * channels + c] = noise;
+		}
+	}
+}
+
+/* Moments of the differences in an element and around. */
+struct moments {
+	double area, mean, square, noise;
+};
+
+static void add(const struct job *j, size_t e, size_t at, struct moments *m)
+{
+	double a = j->m->element_area[e], d = j->difference[at];
+
+	if (isnan(d))
+		return;
+	m->area += a;
+	m->mean += a * d;
+	m->square += a * d * d;
+	m->noise += a * j->noise[at];
+}
+
+static double error_of(const struct moments *m)
+{
+	if (!(m->area > 0))
+		return 0;
+	double mean = m->mean / m->area, all = (m->square - m->noise) / m->area;
+	double square = error_by_roughness * error_by_roughness * (all - mean * mean) +
+	                error_by_curvature * error_by_curvature * mean * mean;
+	return square > 0 ? sqrt(square) : 0;
+}
+
+static void errors(void *arg, size_t begin, size_t end, int thread)
+{
+	const struct job *j = arg;
+	size_t channels = 2 * (size_t)j->s->bands;
+	struct near near[NEAR_MAX];
+
+	(void)thread;
+	for (size_t e = begin; e < end; e++) {
+		size_t n = list_near(j, e, 1, near);
+		for (size_t c = 0; c < channels; c++) {
+			struct moments m = { 0 };
+			add(j, e, e * channels + c, &m);
+			for (size_t i = 0; i < n; i++)
+				add(j, near[i].element, near[i].element * channels + c, &m);
+			j->s->discretisation[e * channels + c] = error_of(&m);
+		}
+	}
+}
+
+int discretisation_estimate(const struct model *m, struct solution *s, int threads,
+                            struct err *e)
+{
+	size_t n = s->element_sides * (size_t)s->bands;
+	struct job j = { .m = m, .s = s };
+	int bad = 1;
+
+	j.h = mem_new(n, sizeof *j.h, "irradiance", e);
+	j.difference = mem_new(n, sizeof *j.difference, "irradiance", e);
+	j.noise = mem_new(n, sizeof *j.noise, "irradiance", e);
+	if (j.h && j.difference && j.noise && !smooth_groups_new(m, cos_crease, &j.g, e)) {
+		for (size_t g = 0; g < s->groups; g++)
+			for (size_t i = 0; i < n; i++)
+				j.h[i] += s->direct[g * n + i] + s->caustic[g * n + i] +
+				          s->indirect[g * n + i];
+		par_for(m->elements, CHUNK, threads, differences, &j, NULL);
+		par_for(m->elements, CHUNK, threads, errors, &j, NULL);
+		bad = 0;
+	}
+	free(j.h);
+	free(j.difference);
+	free(j.noise);
+	smooth_groups_free(&j.g);
+	return bad ? -1 : 0;
+}

@@ -1,0 +1,23 @@
+/* What the division into elements costs: an estimate of how far the irradiance inside
+ * an element-side is from what interpolation between elements shows there.
+ *
+ * A linear function through the elements at the edges of an element predicts its mean;
+ * what it misses is a second difference of the field. Over an element and those that
+ * touch it, the mean of that is its curvature, which costs interpolation a third of it.
+ * Its variation, less what the standard errors of the elements put into it, is of steps
+ * (shadow edges, contacts, rims of caustics), which cost more than they show: a step
+ * through the middle of an element is felt through its neighbours. */
+#ifndef TWOPASS_DISCRETISATION_H
+#define TWOPASS_DISCRETISATION_H
+
+#include "model.h"
+#include "solution.h"
+
+/* Fills s->discretisation [2E][bands], in units of irradiance: root mean square over
+ * the element-side. 0 where too few others of the same smooth surface touch it and its
+ * neighbours, since nothing is known there. Light groups are summed. O(elements), the same
+ * for any number of threads. 0, or -1 and e. */
+int discretisation_estimate(const struct model *m, struct solution *s, int threads,
+                            struct err *e);
+
+#endif
