@@ -13,7 +13,7 @@
  * else of the same input and options, so that what older programs left is made anew. */
 #define REVISION_MESH "2"
 #define REVISION_FF "2"
-#define REVISION_RAD "3"
+#define REVISION_RAD "4"
 #define REVISION_VIEW "1"
 
 /* Strings are owned (malloc) and may be NULL. */

@@ -17,7 +17,7 @@ static const double cos_crease = .86602540378443865;
  * variation, as at steps: as it is for such fields on jittered grids. */
 static const double error_by_curvature = 1. / 3, error_by_roughness = 1.7;
 
-enum { NEAR_MAX = 64, CHUNK = 256 };
+enum { NEAR_MAX = 64, CHUNK = 256, PARTS = 2 };
 
 struct near {
 	uint32_t element;
@@ -29,9 +29,12 @@ struct job {
 	const struct model *m;
 	struct solution *s;
 	struct smooth_groups g;
-	double *h;            /* [2E][bands] irradiance */
-	double *difference;   /* [2E][bands] second difference; NAN: not determined */
-	double *noise;        /* [2E][bands] its variance by the standard errors */
+	/* [2E][parts][bands]: light straight from emitters, which has the edges, apart from
+	 * other light, which has the noise. */
+	double *h;            /* irradiance */
+	double *variance;     /* of it, by the standard errors */
+	double *difference;   /* second difference; NAN: not determined */
+	double *noise;        /* its variance */
 };
 
 /* Elements of the same smooth surface that share `corners` vertices or more with e, by
@@ -130,20 +133,18 @@ static size_t stencil(const struct job *j, size_t e, struct near *near)
 static void differences(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct job *j = arg;
-	size_t channels = 2 * (size_t)j->s->bands;
+	size_t channels = 2 * PARTS * (size_t)j->s->bands;
 	struct near near[NEAR_MAX];
 
 	(void)thread;
 	for (size_t e = begin; e < end; e++) {
 		size_t n = stencil(j, e, near);
 		for (size_t c = 0; c < channels; c++) {
-			double error = j->s->error[e * channels + c], d = j->h[e * channels + c];
-			double noise = error * error;
+			double d = j->h[e * channels + c], noise = j->variance[e * channels + c];
 			for (size_t i = 0; i < n; i++) {
 				size_t at = near[i].element * channels + c;
-				error = near[i].w * j->s->error[at];
 				d -= near[i].w * j->h[at];
-				noise += error * error;
+				noise += near[i].w * near[i].w * j->variance[at];
 			}
 			j->difference[e * channels + c] = n ? d : (double)NAN;
 			j->noise[e * channels + c] = noise;
@@ -168,55 +169,75 @@ static void add(const struct job *j, size_t e, size_t at, struct moments *m)
 	m->noise += a * j->noise[at];
 }
 
-static double error_of(const struct moments *m)
+static double square_error(const struct moments *m)
 {
 	if (!(m->area > 0))
 		return 0;
 	double mean = m->mean / m->area, all = (m->square - m->noise) / m->area;
 	double square = error_by_roughness * error_by_roughness * (all - mean * mean) +
 	                error_by_curvature * error_by_curvature * mean * mean;
-	return square > 0 ? sqrt(square) : 0;
+	return square > 0 ? square : 0;
 }
 
 static void errors(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct job *j = arg;
-	size_t channels = 2 * (size_t)j->s->bands;
+	size_t bands = (size_t)j->s->bands, channels = 2 * PARTS * bands;
 	struct near near[NEAR_MAX];
 
 	(void)thread;
 	for (size_t e = begin; e < end; e++) {
 		size_t n = list_near(j, e, 1, near);
+		double *to = &j->s->discretisation[2 * e * bands];
+		memset(to, 0, 2 * bands * sizeof *to);
 		for (size_t c = 0; c < channels; c++) {
 			struct moments m = { 0 };
 			add(j, e, e * channels + c, &m);
 			for (size_t i = 0; i < n; i++)
 				add(j, near[i].element, near[i].element * channels + c, &m);
-			j->s->discretisation[e * channels + c] = error_of(&m);
+			to[c / (PARTS * bands) * bands + c % bands] += square_error(&m);
 		}
+		for (size_t c = 0; c < 2 * bands; c++)
+			to[c] = sqrt(to[c]);
+	}
+}
+
+static void take_parts(const struct job *j)
+{
+	const struct solution *s = j->s;
+	size_t bands = (size_t)s->bands, n = s->element_sides * bands;
+
+	for (size_t i = 0; i < s->groups * n; i++) {
+		double *h = &j->h[i % n / bands * PARTS * bands + i % bands];
+		h[0] += s->direct[i];
+		h[bands] += s->caustic[i] + s->indirect[i];
+	}
+	for (size_t i = 0; i < n; i++) {
+		double *v = &j->variance[i / bands * PARTS * bands + i % bands];
+		v[0] = s->error_direct[i] * s->error_direct[i];
+		v[bands] = fmax(0, s->error[i] * s->error[i] - v[0]);
 	}
 }
 
 int discretisation_estimate(const struct model *m, struct solution *s, int threads,
                             struct err *e)
 {
-	size_t n = s->element_sides * (size_t)s->bands;
+	size_t n = s->element_sides * PARTS * (size_t)s->bands;
 	struct job j = { .m = m, .s = s };
 	int bad = 1;
 
 	j.h = mem_new(n, sizeof *j.h, "irradiance", e);
 	j.difference = mem_new(n, sizeof *j.difference, "irradiance", e);
 	j.noise = mem_new(n, sizeof *j.noise, "irradiance", e);
-	if (j.h && j.difference && j.noise && !smooth_groups_new(m, cos_crease, &j.g, e)) {
-		for (size_t g = 0; g < s->groups; g++)
-			for (size_t i = 0; i < n; i++)
-				j.h[i] += s->direct[g * n + i] + s->caustic[g * n + i] +
-				          s->indirect[g * n + i];
+	j.variance = mem_new(n, sizeof *j.variance, "irradiance", e);
+	if (j.h && j.variance && j.difference && j.noise && !smooth_groups_new(m, cos_crease, &j.g, e)) {
+		take_parts(&j);
 		par_for(m->elements, CHUNK, threads, differences, &j, NULL);
 		par_for(m->elements, CHUNK, threads, errors, &j, NULL);
 		bad = 0;
 	}
 	free(j.h);
+	free(j.variance);
 	free(j.difference);
 	free(j.noise);
 	smooth_groups_free(&j.g);

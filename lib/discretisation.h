@@ -6,7 +6,8 @@
  * touch it, the mean of that is its curvature, which costs interpolation a third of it.
  * Its variation, less what the standard errors of the elements put into it, is of steps
  * (shadow edges, contacts, rims of caustics), which cost more than they show: a step
- * through the middle of an element is felt through its neighbours. */
+ * through the middle of an element is felt through its neighbours. Light straight from
+ * emitters is looked at apart from other light. */
 #ifndef TWOPASS_DISCRETISATION_H
 #define TWOPASS_DISCRETISATION_H
 
