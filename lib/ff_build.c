@@ -9,7 +9,7 @@
 #include "ff_matrix.h"
 #include "vec3.h"
 
-enum { FORMULA_EVALUATIONS = 1000, FORMULA_BODIES = 8, PATCHES_AT_A_TIME = 64, SOBOL_POINTS_MAX = 1 << 16 };
+enum { FORMULA_EVALUATIONS = 1000, FORMULA_BODIES = 8, PATCHES_AT_A_TIME = 64, SOBOL_POINTS_MAX = 1 << 16, GATHERING_POINTS = 1 << 14 };
 
 /* Of what nothing hides, by formula to elements: finer than any picture shows. */
 static const double FORMULA_ERROR = 1e-5;
@@ -115,16 +115,19 @@ static int fill_samples(struct ff_samples *s, uint32_t each, uint64_t n, struct 
 	return s->bits && sample ? 0 : -1;
 }
 
-/* A replicate is whole blocks of the rows' points, an element-side's rays are of the
+/* A replicate is whole blocks of the rows' points, an element-side's rays are a part of the
  * gathering ones. */
 static int make_samples(struct ff_job *j, struct err *e)
 {
 	uint32_t each = j->o.rays / FF_REPLICATES, gather = j->o.gather;
+	uint32_t shared = gather && gather < GATHERING_POINTS ? GATHERING_POINTS / gather : 1;
 
 	if (j->o.method == FF_HEMICUBE)
 		return 0;
 	return fill_samples(&j->of_rows, each, (uint64_t)each * j->o.emitter_gain, e) ||
-	       fill_samples(&j->of_gathering, gather, gather, e) ? -1 : 0;
+	       fill_samples(&j->of_gathering[0], gather, (uint64_t)gather * shared, e) ||
+	       fill_samples(&j->of_gathering[1], gather >> FF_FEWER, (uint64_t)gather * shared, e)
+	           ? -1 : 0;
 }
 
 /* A ray that lands on some sides has more to it than where it lands. */
@@ -160,7 +163,7 @@ static void job_free(struct ff_job *j)
 {
 	void *array[] = { j->element, j->shoots_diffuse, j->shoots_lobe, j->has_lobe,
 		j->is_source, j->emits, j->is_ideal, j->is_black, j->of_rows.bits,
-		j->of_gathering.bits };
+		j->of_gathering[0].bits, j->of_gathering[1].bits };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
@@ -318,7 +321,7 @@ static int all_patches(struct run *r, uint32_t begin, uint32_t end, struct chain
 {
 	for (uint32_t p = begin; p < end; p += PATCHES_AT_A_TIME) {
 		size_t n = end - p < PATCHES_AT_A_TIME ? end - p : PATCHES_AT_A_TIME;
-		double before = r->job->gather.rays ? (double)r->job->m->patches : 0;
+		double before = r->job->gather.done ? (double)r->job->m->patches : 0;
 		struct part_progress pp = { progress, before + p - begin, before + end - begin };
 		struct progress inner = { report, &pp };
 		r->first = p;

@@ -21,7 +21,7 @@ static const double larger = 2.2, enough = .11;
 static const double misfit = .25;
 
 /* Looking at an element from afar takes so much less time than a ray. */
-enum { LOOKS_A_RAY = 4 };
+enum { LOOKS_A_RAY = 4, ELEMENTS_A_PATCH = 5 };
 
 struct gatherer {
 	const struct ff_job *job;
@@ -37,19 +37,25 @@ struct pair {
 	uint32_t source, count;
 };
 
-/* The rays of an element-side; how many escape, how many meet black sides. */
+/* The rays of an element-side; how many escape, how many meet black sides. Neighbours in
+ * the file, which are so in space, take consecutive parts of one sequence: their rays
+ * together are as well stratified as those of each, and their errors cancel. */
 static void cast(struct gatherer *g, uint32_t column, int thread, uint32_t lost[2])
 {
 	const struct ff_job *j = g->job;
-	uint64_t seed = rng_mix(rng_mix(j->o.seed + 1) ^ rng_mix(~(uint64_t)column));
+	uint32_t rays = j->gather.rays[column >> 1];
+	const struct ff_samples *samples = &j->of_gathering[rays < j->o.gather];
+	uint32_t begin = (uint32_t)(j->gather.first[column >> 1] % samples->n);
+	uint64_t family = ~(2 * (j->gather.first[column >> 1] / samples->n) + (column & 1));
+	uint64_t seed = rng_mix(rng_mix(j->o.seed + 1) ^ rng_mix(family));
 	uint32_t seeds[FF_DIMS], *hits = g->hits[thread];
 	struct ff_batch_rays b;
 
 	for (int d = 0; d < FF_DIMS; d++)
 		seeds[d] = rng_sobol_seed(seed, d);
-	for (uint32_t first = 0; first < j->o.gather; first += RAY_BATCH) {
-		uint32_t n = j->o.gather - first < RAY_BATCH ? j->o.gather - first : RAY_BATCH;
-		ff_batch_from_element(j, &j->of_gathering, seeds, column, first, n, &b);
+	for (uint32_t first = 0; first < rays; first += RAY_BATCH) {
+		uint32_t n = rays - first < RAY_BATCH ? rays - first : RAY_BATCH;
+		ff_batch_from_element(j, samples, seeds, column, begin + first, n, &b);
 		for (uint32_t i = 0; i < n; i++) {
 			if (b.ray.triangle[i] == RAY_MISS) {
 				lost[0]++;
@@ -68,7 +74,7 @@ static void gather_element(struct gatherer *g, uint32_t patch, uint32_t column, 
 	struct vec *met = &g->met[thread];
 	uint32_t lost[2] = { 0 }, ps = 2 * patch + (column & 1);
 	double part = g->job->m->element_area[column >> 1] /
-	              (g->job->m->patch_area[patch] * g->job->o.gather);
+	              (g->job->m->patch_area[patch] * g->to->rays[column >> 1]);
 
 	met->n = 0;
 	cast(g, column, thread, lost);
@@ -101,10 +107,41 @@ static int is_by_formula(const struct ff_job *j, uint32_t ps)
 	return ff_formula_has(&j->formula, ps) && (j->formula.all || j->emits[ps]);
 }
 
-static int takes(const struct ff_job *j, double patch_area, double element_area)
+/* Small patches are not worth more rays for each area than most are. */
+static int takes(const struct ff_job *j, double patch_area, double element_area, uint32_t rays)
 {
 	return patch_area >= larger * element_area &&
-	       j->o.gather * patch_area >= enough * j->o.rays * element_area;
+	       rays * patch_area >= enough * j->o.rays * element_area *
+	                            fmin(1, patch_area / j->gather.common);
+}
+
+/* Plans the rays of elements: o.gather where a patch has ELEMENTS_A_PATCH, fewer where
+ * elements are smaller than that. */
+static void plan(struct ff_job *j)
+{
+	const struct model *m = j->m;
+	struct ff_gather *g = &j->gather;
+	double area = 0, square = 0;
+	uint64_t first = 0;
+
+	for (uint32_t p = 0; p < m->patches; p++) {
+		area += m->patch_area[p];
+		square += m->patch_area[p] * m->patch_area[p];
+	}
+	g->common = square / area;
+	for (uint32_t i = 0; i < m->elements; i++) {
+		double want = ELEMENTS_A_PATCH * j->o.gather * m->element_area[i] / g->common;
+		int fewer = 0;
+		while (fewer < FF_FEWER && (j->o.gather >> fewer) > 1 &&
+		       (j->o.gather >> fewer) > want * sqrt(2))
+			fewer++;
+		g->rays[i] = j->o.gather >> fewer;
+		first += (g->rays[i] - first % g->rays[i]) % g->rays[i];
+		if (first % j->of_gathering[0].n + g->rays[i] > j->of_gathering[0].n)
+			first += j->of_gathering[0].n - first % j->of_gathering[0].n;
+		g->first[i] = first;
+		first += g->rays[i];
+	}
 }
 
 /* Pairs by receiver, in order, become lists by source, in the same order. */
@@ -173,11 +210,14 @@ static int allocate(struct gatherer *g, size_t threads, struct err *e)
 	g->sights = mem_new(2 * g->job->m->elements, sizeof *g->sights, "gathering", e);
 	to->start = mem_new(sides + 1, sizeof *to->start, "gathered light", e);
 	to->centre = mem_new(patches, sizeof *to->centre, "gathered light", e);
+	to->rays = mem_new(g->job->m->elements, sizeof *to->rays, "gathering", e);
+	to->first = mem_new(g->job->m->elements, sizeof *to->first, "gathering", e);
 	to->escape = mem_new(sides, sizeof *to->escape, "gathered light", e);
 	to->black = mem_new(sides, sizeof *to->black, "gathered light", e);
 	for (size_t t = 0; g->hits && t < threads; t++)
 		good &= (g->hits[t] = mem_new(sides, sizeof **g->hits, "gathering", e)) != NULL;
-	return good && g->hits && g->met && g->err && g->pairs && g->sights && to->start &&
+	return good && g->hits && g->met && g->err && g->pairs && g->sights && to->rays &&
+	       to->first && to->start &&
 	       to->centre && to->escape && to->black ? 0 : -1;
 }
 
@@ -202,13 +242,14 @@ static void release(struct gatherer *g, size_t threads)
 static int any_takes(const struct ff_job *j)
 {
 	double most = 0, least = INFINITY;
+	uint32_t rays = j->o.gather;
 
 	for (size_t ps = 0; ps < 2 * j->m->patches; ps++)
 		if (j->shoots_diffuse[ps])
 			most = fmax(most, j->m->patch_area[ps >> 1]);
 	for (size_t i = 0; i < j->m->elements; i++)
 		least = fmin(least, j->m->element_area[i]);
-	return takes(j, most, least);
+	return takes(j, most, least, rays);
 }
 
 /* Rows by formula are made of sights too, whatever their sizes. */
@@ -231,6 +272,7 @@ int ff_gather(struct ff_job *j, double *rays, const struct progress *progress, s
 	bad = allocate(&g, threads, e);
 
 	if (!bad) {
+		plan(j);
 		par_for(j->m->patches, 1, (int)threads, gather_patches, &g, progress);
 		bound_patches(j, j->gather.centre);
 		j->gather.alone = !rows_tell_more(j);
@@ -240,16 +282,18 @@ int ff_gather(struct ff_job *j, double *rays, const struct progress *progress, s
 			bad = err_set(e, "%s", g.err[t].text);
 	for (uint32_t ps = 0; !bad && ps < 2 * j->m->patches; ps++)
 		if (!j->is_black[ps] && !j->is_ideal[ps])
-			*rays += (double)(j->m->patch_start[(ps >> 1) + 1] - j->m->patch_start[ps >> 1]) *
-			         j->o.gather;
+			for (uint32_t i = j->m->patch_start[ps >> 1]; i < j->m->patch_start[(ps >> 1) + 1]; i++)
+				*rays += j->gather.rays[i];
 	bad = bad || transpose(&g, e);
 	release(&g, threads);
-	j->gather.rays = bad ? 0 : j->o.gather;
+	j->gather.done = !bad;
 	return bad ? -1 : 0;
 }
 
 void ff_gather_free(struct ff_gather *g)
 {
+	free(g->rays);
+	free(g->first);
 	free(g->start);
 	free(g->seen);
 	free(g->centre);
@@ -262,7 +306,8 @@ void ff_gather_free(struct ff_gather *g)
 
 static int element_takes(const struct ff_job *j, uint32_t ps, uint32_t column)
 {
-	return takes(j, j->m->patch_area[ps >> 1], j->m->element_area[column >> 1]);
+	return takes(j, j->m->patch_area[ps >> 1], j->m->element_area[column >> 1],
+	             j->gather.rays[column >> 1]);
 }
 
 int ff_row_is_seen(const struct ff_job *j, uint32_t ps)
@@ -291,12 +336,14 @@ static double recall(struct ff_thread *t, uint32_t ps)
 {
 	const struct ff_job *j = t->job;
 	const struct ff_gather *g = &j->gather;
-	double sum = 0, scale = 1 / (j->m->patch_area[ps >> 1] * g->rays);
+	double sum = 0;
 
 	t->sights.n = 0;
 	for (uint64_t i = g->start[ps]; i < g->start[ps + 1]; i++) {
-		double n = g->seen[i].count, one = scale * j->m->element_area[g->seen[i].column >> 1];
-		struct ff_sight s = { g->seen[i].column, one * n, one * one * n * (1 - n / g->rays) };
+		uint32_t el = g->seen[i].column >> 1;
+		double n = g->seen[i].count;
+		double one = j->m->element_area[el] / (j->m->patch_area[ps >> 1] * g->rays[el]);
+		struct ff_sight s = { g->seen[i].column, one * n, one * one * n * (1 - n / g->rays[el]) };
 		if (!element_takes(j, ps, s.column))
 			continue;
 		if (vec_append(&t->sights, &s, 1, sizeof s, &t->tally.err))
@@ -337,7 +384,10 @@ static double not_lost(struct ff_thread *t, uint32_t ps, double sum, double vari
 	const struct ff_job *j = t->job;
 	const uint32_t *start = &j->m->patch_start[ps >> 1];
 	double escape = j->gather.escape[ps], black = j->gather.black[ps];
-	double own = escape * (1 - escape) / ((double)j->gather.rays * (start[1] - start[0]));
+	double rays = 0;
+	for (uint32_t i = start[0]; i < start[1]; i++)
+		rays += j->gather.rays[i];
+	double own = escape * (1 - escape) / rays;
 	double lands = 1 - escape - black;
 
 	if (own > 0)

@@ -10,8 +10,9 @@
 #include "ray.h"
 #include "rng.h"
 
-/* FF_CLOSE_RAYS: a power of two that an element close to an emitter casts. */
-enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048 };
+/* FF_CLOSE_RAYS: a power of two that an element close to an emitter casts.
+ * FF_FEWER: small elements gather with down to 2^-FF_FEWER of the rays. */
+enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048, FF_FEWER = 4 };
 
 /* An element as a place to send rays from. Points are corner + w1 edge[0] + w2 edge[1],
  * with weights that keep a little clear of the edges. Threes are padded to four. */
@@ -37,7 +38,12 @@ struct ff_gathered {
 };
 
 struct ff_gather {
-	uint32_t rays;            /* from an element-side; 0: nothing was gathered */
+	int done;                 /* anything was gathered */
+	uint32_t *rays;           /* [E] of a side: in proportion to its area, as many for each
+	                             area as the patches' rows are to have, but no more than
+	                             o.gather */
+	uint64_t *first;          /* [E] of them, in one sequence for all elements */
+	double common;            /* area-weighted mean area of patches */
 	int alone;                /* rows tell of nothing but diffuse landings */
 	uint64_t *start;          /* [2P+1] of a patch-side, ordered by place */
 	struct ff_gathered *seen;
@@ -62,7 +68,7 @@ struct ff_job {
 	uint8_t *has_lobe;        /* [2P] light arriving here leaves by a finite lobe */
 	uint8_t *emits;           /* [2P] gives light of its own */
 	uint8_t *is_source;       /* [2P] any light leaves here */
-	struct ff_samples of_rows, of_gathering;
+	struct ff_samples of_rows, of_gathering[2]; /* for most rays an element, and for fewer */
 	struct tally_places places;
 	struct ff_gather gather;
 	struct ff_formula formula;

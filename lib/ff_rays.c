@@ -336,7 +336,7 @@ static struct ff_weight diffuse(struct ff_thread *t, uint32_t ps)
 	const struct ff_job *j = t->job;
 	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
 	struct ff_weight w = { rays, rays };
-	int gathered = j->gather.rays && j->shoots_diffuse[ps];
+	int gathered = j->gather.done && j->shoots_diffuse[ps];
 	int alone = gathered && ff_row_is_gathered(j, ps);
 
 	if (alone && ff_redistribute(t, ps, 0, &w))
