@@ -23,10 +23,21 @@ enum {
 struct plan {
 	const struct model *m;
 	double *energy;       /* [elements] */
+	double *patch_energy; /* [patches] what they cost others */
 	uint8_t *most;        /* [elements] halvings that the least size leaves room for */
 	double allowed;       /* sum of energies that is asked for */
 	size_t elements;      /* and no more than so many elements */
 };
+
+/* Square of the error of an element-side's irradiance, as far as it is certain: an estimate
+ * from few elements is off by about as much as the noise of their light, of which only light
+ * straight from emitters is free. */
+static double certain(const struct solution *s, size_t at)
+{
+	double d = s->discretisation[at], noise = s->error[at], direct = s->error_direct[at];
+
+	return fmax(0, d * d - fmax(0, noise * noise - direct * direct));
+}
 
 /* Adds up the error of what one side shows, in units of irradiance: coefficients times the
  * errors of both sides' irradiance, as if these were independent. */
@@ -40,10 +51,11 @@ static double side_energy(const struct model *m, const struct solution *s, size_
 	double sum = 0;
 
 	for (size_t k = 0; k < bands; k++) {
-		double own = mt->rho_d[here + k] * s->discretisation[es * bands + k];
-		double across = mt->one_sided[material] ? 0 : mt->tau_d[there + k] *
-		                s->discretisation[(es ^ 1) * bands + k];
-		sum += own * own + across * across;
+		double own = mt->rho_d[here + k];
+		double across = mt->one_sided[material] ? 0 : mt->tau_d[there + k];
+		sum += own * own * certain(s, es * bands + k);
+		if (across > 0)
+			sum += across * across * certain(s, (es ^ 1) * bands + k);
 	}
 	return m->element_area[element] * sum;
 }
@@ -67,6 +79,8 @@ static double find_energies(struct plan *p, const struct solution *s)
 	double mean = area > 0 ? sum / area / m->bands : 0;
 	for (size_t i = 0; i < m->elements; i++)
 		p->energy[i] = mean > 0 ? p->energy[i] / (mean * mean) : 0;
+	for (size_t i = 0; i < m->patches; i++)
+		p->patch_energy[i] = mean > 0 ? p->patch_energy[i] / (mean * mean) : 0;
 	return area * m->bands;
 }
 
@@ -93,13 +107,12 @@ static void find_room(struct plan *p, double smallest)
 	}
 }
 
-/* Halvings of an element until each of its parts has no more than the bound. */
-static uint8_t halvings(const struct plan *p, size_t i, double bound)
+/* Halvings of what has this energy until each of its parts has no more than the bound. */
+static uint8_t halvings(double energy, uint8_t most, double bound)
 {
-	double energy = p->energy[i];
 	uint8_t n = 0;
 
-	for (; n < p->most[i] && energy > bound; n++)
+	for (; n < most && energy > bound; n++)
 		energy *= left / 2;
 	return n;
 }
@@ -113,10 +126,12 @@ static double expect(const struct plan *p, double bound, size_t *elements)
 		kept[n + 1] = kept[n] * left;
 	*elements = 0;
 	for (size_t i = 0; i < p->m->elements; i++) {
-		uint8_t n = halvings(p, i, bound);
+		uint8_t n = halvings(p->energy[i], p->most[i], bound);
 		sum += p->energy[i] * kept[n];
 		*elements += (size_t)1 << n;
 	}
+	for (size_t i = 0; i < p->m->patches; i++)
+		sum += p->patch_energy[i] * kept[halvings(p->patch_energy[i], HALVINGS_MAX, bound / 4)];
 	return sum;
 }
 
@@ -129,6 +144,8 @@ static double find_bound(const struct plan *p)
 
 	for (size_t i = 0; i < p->m->elements; i++)
 		high = fmax(high, p->energy[i]);
+	for (size_t i = 0; i < p->m->patches; i++)
+		high = fmax(high, p->patch_energy[i]);
 	double least = ldexp(high, -BISECTIONS);
 	for (int i = 0; i < BISECTIONS; i++) {
 		double bound = sqrt(fmax(low, least) * high), sum = expect(p, bound, &elements);
@@ -141,37 +158,53 @@ static double find_bound(const struct plan *p)
 	return elements > p->elements ? high : low;
 }
 
-static double total(const struct plan *p)
+static double total(const double *energy, size_t n)
 {
 	double sum = 0;
 
-	for (size_t i = 0; i < p->m->elements; i++)
-		sum += p->energy[i];
+	for (size_t i = 0; i < n; i++)
+		sum += energy[i];
 	return sum;
 }
 
 int adapt_plan(const struct model *m, const struct solution *s, const struct mesher_refinement *o,
-               double smallest, uint8_t *halving, struct mesher_report *r, struct err *e)
+               double smallest, uint8_t *halving, uint8_t *patch_halving,
+               struct mesher_report *r, struct err *e)
 {
 	struct plan p = { .m = m, .elements = o->elements };
 	size_t elements;
 
 	p.energy = mem_new(m->elements, sizeof *p.energy, "errors of elements", e);
+	p.patch_energy = mem_new(m->patches, sizeof *p.patch_energy, "errors of patches", e);
 	p.most = mem_new(m->elements, sizeof *p.most, "errors of elements", e);
-	if (p.energy && p.most) {
+	int status = p.energy && p.patch_energy && p.most &&
+	             !patch_energies(m, s, p.patch_energy, e) ? 0 : -1;
+	if (!status) {
 		double unit = find_energies(&p, s);
-		p.allowed = o->error * o->error * unit;
 		find_room(&p, smallest);
-		double sum = total(&p), bound = sum <= p.allowed ? INFINITY : find_bound(&p);
-		for (size_t i = 0; i < m->elements; i++) {
-			halving[i] = halvings(&p, i, bound);
-			r->marked += halving[i] > 0;
+		p.allowed = o->error * o->error * unit;
+		double own = total(p.energy, m->elements);
+		double others = total(p.patch_energy, m->patches);
+		double bound = own + others <= p.allowed ? INFINITY : find_bound(&p);
+		for (size_t i = 0; i < m->patches; i++) {
+			patch_halving[i] = halvings(p.patch_energy[i], HALVINGS_MAX, bound / 4);
+			r->patches_marked += patch_halving[i] > 0;
 		}
-		r->error_before = unit > 0 ? sqrt(sum / unit) : 0;
-		r->error_expected = unit > 0 ? sqrt(expect(&p, bound, &elements) / unit) : 0;
+		for (size_t i = 0; i < m->elements; i++) {
+			uint8_t with_patch = patch_halving[m->element_patch[i]];
+			halving[i] = halvings(p.energy[i], p.most[i], bound);
+			r->marked += halving[i] > 0;
+			if (halving[i] < with_patch)
+				halving[i] = with_patch < p.most[i] ? with_patch : p.most[i];
+		}
+		if (unit > 0) {
+			r->error_before = sqrt((own + others) / unit);
+			r->patch_error_before = sqrt(others / unit);
+			r->error_expected = sqrt(expect(&p, bound, &elements) / unit);
+		}
 	}
-	int status = p.energy && p.most ? 0 : -1;
 	free(p.energy);
+	free(p.patch_energy);
 	free(p.most);
 	return status;
 }

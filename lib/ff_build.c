@@ -124,7 +124,8 @@ static int make_samples(struct ff_job *j, struct err *e)
 
 	if (j->o.method == FF_HEMICUBE)
 		return 0;
-	return fill_samples(&j->of_rows, each, (uint64_t)each * j->o.emitter_gain, e) ||
+	return fill_samples(&j->of_rows[0], each, (uint64_t)each * j->o.emitter_gain, e) ||
+	       fill_samples(&j->of_rows[1], each >> FF_FEWER, each, e) ||
 	       fill_samples(&j->of_gathering[0], gather, (uint64_t)gather * shared, e) ||
 	       fill_samples(&j->of_gathering[1], gather >> FF_FEWER, (uint64_t)gather * shared, e)
 	           ? -1 : 0;
@@ -162,7 +163,8 @@ static int job_init(struct ff_job *j, const struct model *m, const struct ff_opt
 static void job_free(struct ff_job *j)
 {
 	void *array[] = { j->element, j->shoots_diffuse, j->shoots_lobe, j->has_lobe,
-		j->is_source, j->emits, j->is_ideal, j->is_black, j->of_rows.bits,
+		j->is_source, j->emits, j->is_ideal, j->is_black, j->of_rows[0].bits,
+		j->of_rows[1].bits,
 		j->of_gathering[0].bits, j->of_gathering[1].bits };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)

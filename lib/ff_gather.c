@@ -115,6 +115,18 @@ static int takes(const struct ff_job *j, double patch_area, double element_area,
 	                            fmin(1, patch_area / j->gather.common);
 }
 
+/* The next place in the sequence from which n points are as well stratified as n can be,
+ * without running over the end of a family of points. */
+static uint64_t align(uint64_t first, uint64_t n, uint64_t points)
+{
+	uint64_t unit = 1;
+
+	while (2 * unit <= n && 2 * unit <= points)
+		unit *= 2;
+	first += (unit - first % unit) % unit;
+	return n <= points && first % points + n > points ? first + points - first % points : first;
+}
+
 /* Plans the rays of elements: o.gather where a patch has ELEMENTS_A_PATCH, fewer where
  * elements are smaller than that. */
 static void plan(struct ff_job *j)
@@ -136,11 +148,17 @@ static void plan(struct ff_job *j)
 		       (j->o.gather >> fewer) > want * sqrt(2))
 			fewer++;
 		g->rays[i] = j->o.gather >> fewer;
-		first += (g->rays[i] - first % g->rays[i]) % g->rays[i];
-		if (first % j->of_gathering[0].n + g->rays[i] > j->of_gathering[0].n)
-			first += j->of_gathering[0].n - first % j->of_gathering[0].n;
-		g->first[i] = first;
-		first += g->rays[i];
+	}
+	for (uint32_t p = 0; p < m->patches; p++) {
+		uint64_t all = 0;
+		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++)
+			all += g->rays[i];
+		first = align(first, all, j->of_gathering[0].n);
+		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++) {
+			first = align(first, g->rays[i], j->of_gathering[0].n);
+			g->first[i] = first;
+			first += g->rays[i];
+		}
 	}
 }
 

@@ -68,7 +68,8 @@ struct ff_job {
 	uint8_t *has_lobe;        /* [2P] light arriving here leaves by a finite lobe */
 	uint8_t *emits;           /* [2P] gives light of its own */
 	uint8_t *is_source;       /* [2P] any light leaves here */
-	struct ff_samples of_rows, of_gathering[2]; /* for most rays an element, and for fewer */
+	struct ff_samples of_rows[2], of_gathering[2]; /* for as many rays as most cast, and for
+	                                                  fewer */
 	struct tally_places places;
 	struct ff_gather gather;
 	struct ff_formula formula;

@@ -281,6 +281,7 @@ static void batch_land(struct ff_thread *t, int side, uint32_t n, const struct f
 static void cast(struct ff_thread *t, uint32_t ps, uint32_t count, double exponent)
 {
 	const struct ff_job *j = t->job;
+	const struct ff_samples *samples = &j->of_rows[count < j->o.rays];
 	uint32_t each = count / FF_REPLICATES;
 	struct ff_batch_rays b;
 
@@ -288,7 +289,7 @@ static void cast(struct ff_thread *t, uint32_t ps, uint32_t count, double expone
 		struct scramble s = scramble(j, 2 * ps + (exponent >= 0), r);
 		for (uint32_t first = 0; first < each; first += RAY_BATCH) {
 			uint32_t n = each - first < RAY_BATCH ? each - first : RAY_BATCH;
-			ff_batch_numbers(&j->of_rows, s.seed, first, n, &b);
+			ff_batch_numbers(samples, s.seed, first, n, &b);
 			ff_batch_elements(j, ps >> 1, n, &b);
 			ff_batch_origins(j, (int)(ps & 1), n, &b);
 			if (exponent < 0)
@@ -329,12 +330,28 @@ static void cast_lobe_ray(struct ff_thread *t, const struct capture *c, int side
 		ff_lobes_cast(t);
 }
 
+/* Rays of a diffuse row: a patch that is smaller than most, as refinement makes them, has as
+ * many for its area as these. */
+static uint32_t row_rays(const struct ff_job *j, uint32_t ps)
+{
+	uint32_t rays = j->o.rays, fewer = 0;
+
+	if (j->emits[ps])
+		return rays * j->o.emitter_gain;
+	if (!j->gather.done || j->has_lobe[ps])
+		return rays;
+	while (fewer < FF_FEWER && (rays >> fewer) * j->gather.common >
+	                               rays * j->m->patch_area[ps >> 1] * sqrt(2))
+		fewer++;
+	return rays >> fewer < FF_REPLICATES ? rays : rays >> fewer;
+}
+
 /* The diffuse row of a patch-side into the tally: its own rays, where it needs them, and
  * what was gathered of it, where that is better. */
 static struct ff_weight diffuse(struct ff_thread *t, uint32_t ps)
 {
 	const struct ff_job *j = t->job;
-	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
+	uint32_t rays = row_rays(j, ps);
 	struct ff_weight w = { rays, rays };
 	int gathered = j->gather.done && j->shoots_diffuse[ps];
 	int alone = gathered && ff_row_is_gathered(j, ps);

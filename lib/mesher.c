@@ -71,7 +71,7 @@ static int make_patches(struct model *m, const struct mesher_options *o,
 	uint32_t *patch = mem_new(m->elements, sizeof *patch, "patches", e);
 	double cos_cone = cos(o->normal_cone * acos(-1) / 180);
 	int status = patch && !find_patches(m, r->patch_size, cos_cone, patch, &patches, e) &&
-	             !order_model(m, patch, patches, e) ? 0 : -1;
+	             !order_model(m, patch, patches, NULL, e) ? 0 : -1;
 
 	free(patch);
 	return status;
@@ -186,6 +186,11 @@ static int same_triangles(const struct model *a, const struct model *b)
 	return 1;
 }
 
+/* Halvings. */
+struct plan {
+	uint8_t *element, *patch;
+};
+
 /* Gives m the vertices, elements and split trees of old. */
 static void take_division(struct model *m, struct model *old)
 {
@@ -206,16 +211,25 @@ static void take_division(struct model *m, struct model *old)
 	old->split = NULL;
 }
 
-/* Divides m, which is as `old` was, and keeps old's patches. */
-static int divide_further(struct model *m, const struct model *old, const uint8_t *halvings,
-                          uint32_t **origin, struct err *e)
+/* Divides m, which is as `old` was, by the plan. */
+static int divide_further(struct model *m, const struct mesher_options *o,
+                          const struct mesher_report *r, const struct model *old,
+                          const struct plan *plan, uint32_t **origin, struct err *e)
 {
-	if (subdivide_further(m, halvings, origin, e))
+	double cos_cone = cos(o->normal_cone * acos(-1) / 180);
+	size_t patches;
+
+	if (subdivide_further(m, plan->element, origin, e))
 		return -1;
+	uint32_t *before = mem_new(m->elements, sizeof *before, "patches", e);
 	uint32_t *patch = mem_new(m->elements, sizeof *patch, "patches", e);
-	for (size_t i = 0; patch && i < m->elements; i++)
-		patch[i] = old->element_patch[(*origin)[i]];
-	int status = patch ? order_elements(m, patch, old->patches, *origin, e) : -1;
+	for (size_t i = 0; before && i < m->elements; i++)
+		before[i] = old->element_patch[(*origin)[i]];
+	int status = before && patch &&
+	             !split_patches(m, r->patch_size, cos_cone, before, old->patches, plan->patch,
+	                            patch, &patches, e) &&
+	             !order_model(m, patch, patches, *origin, e) ? 0 : -1;
+	free(before);
 	free(patch);
 	return status;
 }
@@ -233,15 +247,19 @@ int mesher_refine(struct model *m, const struct mesher_options *o, struct model 
 		               "option of mesh, has changed since; make a mesh without --refine");
 	tell(o, 1);
 	r->elements_before = old->elements;
-	uint8_t *halvings = mem_new(old->elements, 1, "elements", e);
-	int status = halvings && !adapt_plan(old, s, how, metres(how->smallest, r->diagonal),
-	                                     halvings, r, e) ? 0 : -1;
+	r->patches_before = old->patches;
+	struct plan plan = { mem_new(old->elements, 1, "elements", e),
+		             mem_new(old->patches, 1, "patches", e) };
+	int status = plan.element && plan.patch &&
+	             !adapt_plan(old, s, how, metres(how->smallest, r->diagonal), plan.element,
+	                         plan.patch, r, e) ? 0 : -1;
 	tell(o, 2);
 	if (!status) {
 		take_division(m, old);
-		status = divide_further(m, old, halvings, origin, e);
+		status = divide_further(m, o, r, old, &plan, origin, e);
 	}
-	free(halvings);
+	free(plan.element);
+	free(plan.patch);
 	tell(o, 3);
 	return status ? -1 : finish(m, r, e);
 }

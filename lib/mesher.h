@@ -63,8 +63,10 @@ struct mesher_report {
 	double area_front, area_back;    /* of the modelled sides, m^2 */
 
 	/* Of mesher_refine. Errors as in struct mesher_refinement. */
-	size_t elements_before, marked;  /* marked: to be divided for their own sake */
+	size_t elements_before, patches_before;
+	size_t marked, patches_marked;   /* to be divided for their own sake */
 	double error_before, error_expected;
+	double patch_error_before;       /* the part of patches in error_before */
 
 	/* Pieces connected by edges, coincident edges of different surfaces taken
 	 * together. A piece is closed if each of its edges has two triangles. */
@@ -82,8 +84,9 @@ int mesher_run(struct model *m, const struct mesher_options *o, struct mesher_re
                struct err *e);
 
 /* The same from an earlier mesh and its solution: `old` becomes the division of m, with
- * those elements halved that contribute most to the error that s states (s->discretisation).
- * Patches stay as they were. m may have other materials and cameras than old, but its
+ * those elements halved that contribute most to the error that s states (s->discretisation),
+ * and those patches whose exitance differs too much from place to place for what is next to
+ * them. Other patches stay as they were. m may have other materials and cameras than old, but its
  * triangles, cleaned and cut as o says, must be the same. (*origin)[e] = element of old that
  * element e is part of, to be freed in any case. old is used up. */
 int mesher_refine(struct model *m, const struct mesher_options *o, struct model *old,

@@ -24,6 +24,9 @@ enum {
  * variance of one element. */
 static const double accepted_variance = 1.5;
 
+/* Noise of this part of a value is not worth a wider fit. */
+static const double still = .03;
+
 /* A linear function over some elements near a vertex, in coordinates (x, y) of the
  * tangent plane about it: value = mean + gradient . (-mx, -my). */
 struct fit {
@@ -276,31 +279,36 @@ static void widen(const struct job *j, struct scratch *s, size_t group, const do
                   struct fit *f, size_t begin, size_t channels, double *value)
 {
 	uint32_t vertex = j->m->element[j->g.corner[j->g.start[group]]];
-	double narrow = f->variance, first[CHANNELS_MAX], open[CHANNELS_MAX], error2[CHANNELS_MAX];
-	int any = 1;
+	double first[CHANNELS_MAX], open[CHANNELS_MAX], one[CHANNELS_MAX], narrow = f->variance;
 
 	for (size_t c = 0; c < channels; c++) {
 		first[c] = value[c];
 		open[c] = 1;
-		error2[c] = narrow * mean_variance(j, s, f, c);
+		one[c] = mean_variance(j, s, f, c);
 	}
-	for (int ring = 1; any && ring <= RINGS; ring++) {
+	for (int ring = 1; ring <= RINGS; ring++) {
 		size_t end = f->n;
+		int any = 0;
+		for (size_t c = 0; c < channels; c++) {
+			if (f->variance * one[c] <= still * still * value[c] * value[c])
+				open[c] = 0;
+			any |= open[c] > 0;
+		}
+		if (!any)
+			return;
 		if (!add_ring(j, s, group, normal, begin, end, &f->n))
 			return;
 		begin = end;
 		place(j, s, f->n, vertex, normal);
 		prepare(s, f);
-		any = 0;
 		for (size_t c = 0; c < channels && f->variance <= accepted_variance; c++) {
-			if (!(open[c] > 0 && error2[c] > 0))
+			if (!(open[c] > 0))
 				continue;
 			struct channel t = fit_channel(j, s, f, c);
 			double off = clamped(&t) - first[c];
 			open[c] *= fmin(consistency(j, s, f, &t, c),
-			                fmax(0, fmin(1, 2 - off * off / error2[c])));
+			                fmax(0, fmin(1, 2 - off * off / (narrow * one[c]))));
 			value[c] += open[c] * (clamped(&t) - value[c]);
-			any |= open[c] > 0;
 		}
 	}
 }
@@ -434,7 +442,7 @@ static void store_groups(void *arg, size_t begin, size_t end, int thread)
 
 static void run(struct job *j, int threads)
 {
-	enum { CHUNK = 1024, SPREADS = 3 };
+	enum { CHUNK = 1024, SPREADS = 4 };
 
 	par_for(j->g.groups, CHUNK, threads, solve_groups, j, NULL);
 	par_for(j->m->elements, CHUNK, threads, find_rest, j, NULL);
