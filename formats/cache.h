@@ -7,13 +7,13 @@
 #include "container.h"
 
 #define CACHE_VERSION "1"    /* of .mesh and .rad files */
-#define CACHE_FF_VERSION "2" /* of .ff files */
+#define CACHE_FF_VERSION "3" /* of .ff files */
 
 /* Part of the key of each stage's output. To be raised whenever a stage makes something
  * else of the same input and options, so that what older programs left is made anew. */
 #define REVISION_MESH "2"
-#define REVISION_FF "2"
-#define REVISION_RAD "4"
+#define REVISION_FF "5"
+#define REVISION_RAD "5"
 #define REVISION_VIEW "1"
 
 /* Strings are owned (malloc) and may be NULL. */

@@ -4,6 +4,7 @@
 
 #include "../lib/ff.h"
 #include "../lib/ff_check.h"
+#include "../lib/mem.h"
 #include "cache.h"
 
 struct ff_writer;
@@ -18,7 +19,7 @@ struct ff_writer *ff_file_create(const char *path, const struct model *m, int f6
 /* Appends a batch: its rows, blocks, entries, arrivals and links (all indices in
  * it relative to the batch; chains ignored, block_chain and link_chain are those
  * of the final table) behind those written so far. Its columns are lists; they
- * become spans where these are shorter. O(batch). */
+ * become spans where these are shorter, and arrays of the usual are left out. O(batch). */
 int ff_file_append(struct ff_writer *w, const struct ff *batch, struct err *e);
 
 /* Writes the chain table and patch range of `whole` (its rows are ignored) and
@@ -31,8 +32,8 @@ void ff_file_abandon(struct ff_writer *w);
  * 0 if it has them already, 1 if it was rewritten with them, -1 and e. O(file) then. */
 int ff_file_rename(const char *path, const struct model *m, struct err *e);
 
-/* An open .ff; f's and scene's arrays point into the mapped file (do not ff_free
- * f, do not write to them). */
+/* An open .ff; f's and scene's arrays point into the mapped file, or were made since it
+ * leaves them out (do not ff_free f, do not write to them). */
 struct ff_file {
 	struct container *container;
 	struct ff f;
@@ -43,6 +44,7 @@ struct ff_file {
 	size_t surfaces;
 	char **surface_name;       /* [surfaces] */
 	const uint32_t *patch_surface;
+	struct vec made;           /* void *: arrays that the file leaves out, see ff(5) */
 };
 
 /* Opens and checks all (digests, monotone starts, ranges against `m`, finite and

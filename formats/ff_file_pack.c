@@ -1,12 +1,17 @@
 #include "ff_file_pack.h"
 
 #include <stdlib.h>
+#include <string.h>
+#include <xxhash.h>
 
 #include "../lib/check.h"
 
+/* Blocks of fewer words are not worth looking for. */
+enum { WORTH_SHARING = 8 };
+
 void ff_packed_free(struct ff_packed *p)
 {
-	struct vec *v[] = { &p->word, &p->word_start, &p->column, &p->value, &p->start, &p->scale };
+	struct vec *v[] = { &p->word, &p->block_column, &p->column, &p->value, &p->start, &p->scale };
 
 	for (size_t i = 0; i < sizeof v / sizeof *v; i++)
 		free(v[i]->data);
@@ -25,6 +30,7 @@ static uint64_t count_spans(const struct ff *f, uint64_t block)
 	return n;
 }
 
+/* Appends the words of a block. 1 if they are spans, 0 if a list, -1 and e. */
 static int pack_block(const struct ff *f, uint64_t block, struct vec *word, struct err *e)
 {
 	const uint64_t first = f->block_start[block], n = f->block_start[block + 1] - first;
@@ -41,21 +47,48 @@ static int pack_block(const struct ff *f, uint64_t block, struct vec *word, stru
 		*to++ = s.count;
 	}
 	word->n += (size_t)(2 * spans);
-	return 0;
+	return 1;
+}
+
+/* ---- words that blocks share ---- */
+
+/* The block_column of the words from `first` of the batch on, or of the same words
+ * before: then they are taken back. */
+static uint64_t share(struct ff_packed *p, size_t first, int spans)
+{
+	const uint64_t place = 2 * (p->words + first) + (uint64_t)spans;
+	struct ff_known now = { .place = place };
+
+	if (p->word.n - first < WORTH_SHARING)
+		return place;
+	const uint32_t *word = (const uint32_t *)p->word.data + first;
+	XXH128_canonical_t digest;
+	XXH128_canonicalFromHash(&digest, XXH3_128bits_withSeed(word, (p->word.n - first) * sizeof *word,
+	                                                        (uint64_t)spans));
+	memcpy(now.digest, digest.digest, sizeof now.digest);
+	for (size_t i = 0; i < FF_PACK_KNOWN && i < p->packed; i++)
+		if (memcmp(p->known[i].digest, now.digest, sizeof now.digest) == 0) {
+			p->word.n = first;
+			return p->known[i].place;
+		}
+	p->known[p->packed++ % FF_PACK_KNOWN] = now;
+	return place;
 }
 
 int ff_pack_columns(const struct ff *batch, struct ff_packed *p, struct err *e)
 {
-	p->word.n = p->word_start.n = 0;
+	p->words += p->word.n;
+	p->word.n = p->block_column.n = 0;
 	if (check_starts("block_start", batch->block_start, batch->blocks, batch->entries, 0, e) ||
-	    vec_reserve(&p->word_start, batch->blocks + 1, sizeof(uint64_t), e))
+	    vec_reserve(&p->block_column, batch->blocks, sizeof(uint64_t), e))
 		return -1;
-	uint64_t *start = p->word_start.data;
-	start[0] = 0;
+	uint64_t *column = p->block_column.data;
 	for (uint64_t b = 0; b < batch->blocks; b++) {
-		if (pack_block(batch, b, &p->word, e))
+		size_t first = p->word.n;
+		int spans = pack_block(batch, b, &p->word, e);
+		if (spans < 0)
 			return -1;
-		start[b + 1] = p->word.n;
+		column[b] = share(p, first, spans);
 	}
 	return 0;
 }

@@ -17,17 +17,31 @@ static enum dtype value_type(const struct container *c)
 	return v && v->type == DT_F64 ? DT_F64 : DT_F32;
 }
 
+static enum dtype column_type(const struct container *c)
+{
+	const struct container_view *v = container_find(c, "column");
+
+	return v && v->type == DT_U16 ? DT_U16 : DT_U32;
+}
+
+/* 0 where there are none. */
+static int size_if_any(const struct container *c, const char *name, size_t *size, struct err *e)
+{
+	*size = 0;
+	return container_find(c, name) ? fields_size(c, name, DT_U32, 1, 0, size, e) : 0;
+}
+
 /* Sizes from the arrays that have them to themselves. */
 static int get_counts(const struct container *c, struct ff *f, struct err *e)
 {
 	if (fields_size(c, "chain_start", DT_U64, 1, 0, &f->chains, e) ||
-	    fields_size(c, "chain_event", DT_U32, 1, 0, &f->chain_events, e) ||
-	    fields_size(c, "row_side", DT_U32, 1, 0, &f->rows, e) ||
-	    fields_size(c, "block_chain", DT_U32, 1, 0, &f->blocks, e) ||
-	    fields_size(c, "column", DT_U32, 1, 0, &f->columns, e) ||
+	    size_if_any(c, "chain_event", &f->chain_events, e) ||
+	    fields_size(c, "row_scale", DT_F64, 1, 0, &f->rows, e) ||
+	    fields_size(c, "block_column", DT_U64, 1, 0, &f->blocks, e) ||
+	    fields_size(c, "column", column_type(c), 1, 0, &f->columns, e) ||
 	    fields_size(c, "value", value_type(c), 1, 0, &f->entries, e) ||
-	    fields_size(c, "arrival_target", DT_U32, 1, 0, &f->arrivals, e) ||
-	    fields_size(c, "link_target", DT_U32, 1, 0, &f->links, e))
+	    size_if_any(c, "arrival_target", &f->arrivals, e) ||
+	    size_if_any(c, "link_target", &f->links, e))
 		return -1;
 	if (f->chains == 0)
 		return container_refuse(c, e, "array chain_start: it is empty");
@@ -36,43 +50,44 @@ static int get_counts(const struct container *c, struct ff *f, struct err *e)
 }
 
 static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
-                      struct err *e)
+                      struct vec *made, struct err *e)
 {
-	const int f64 = value_type(c) == DT_F64;
-	const struct field field[] = {
-		{ &f->chain_start, "chain_start", DT_U64, 1, { f->chains + 1 } },
-		{ &f->chain_event, "chain_event", DT_U32, 1, { f->chain_events } },
-		{ &f->chain_count, "chain_count", DT_U32, 1, { f->chain_events } },
-		{ &f->row_side, "row_side", DT_U32, 1, { f->rows } },
-		{ &f->row_kind, "row_kind", DT_U8, 1, { f->rows } },
-		{ &f->row_samples, "row_samples", DT_U32, 1, { f->rows } },
-		{ &f->row_scale, "row_scale", DT_F64, 1, { f->rows } },
-		{ &f->row_residual, "row_residual", DT_F64, 1, { f->rows } },
-		{ &f->row_error, "row_error", DT_F64, 1, { f->rows } },
-		{ &f->row_block, "row_block", DT_U64, 1, { f->rows + 1 } },
-		{ &f->block_chain, "block_chain", DT_U32, 1, { f->blocks } },
-		{ &f->block_start, "block_start", DT_U64, 1, { f->blocks + 1 } },
-		{ &f->block_column, "block_column", DT_U64, 1, { f->blocks + 1 } },
-		{ &f->block_escape, "block_escape", DT_F64, 1, { f->blocks } },
-		{ &f->block_black, "block_black", DT_F64, 1, { f->blocks } },
-		{ &f->block_lost, "block_lost", DT_F64, 1, { f->blocks } },
-		{ &f->block_cut, "block_cut", DT_F64, 1, { f->blocks } },
-		{ &f->block_arrival, "block_arrival", DT_U64, 1, { f->blocks + 1 } },
-		{ &f->column, "column", DT_U32, 1, { f->columns } },
-		{ &f->arrival_target, "arrival_target", DT_U32, 1, { f->arrivals } },
-		{ &f->arrival_direction, "arrival_direction", DT_F32, 2, { f->arrivals, 3 } },
-		{ &f->link_target, "link_target", DT_U32, 1, { f->links } },
-		{ &f->link_source, "link_source", DT_U32, 1, { f->links } },
-		{ &f->link_last, "link_last", DT_U32, 1, { f->links } },
-		{ &f->link_chain, "link_chain", DT_U32, 1, { f->links } },
-		{ &f->link_direction, "link_direction", DT_F32, 2, { f->links, 3 } },
-		{ &f->link_row, "link_row", DT_U32, 2, { f->links, 2 } },
-		{ part, "part", DT_U32, 1, { 4 } },
-		{ f64 ? (void *)&f->value64 : (void *)&f->value, "value",
-		  f64 ? DT_F64 : DT_F32, 1, { f->entries } },
+	const int f64 = value_type(c) == DT_F64, narrow = column_type(c) == DT_U16;
+	const struct field_or_not field[] = {
+		{ { &f->chain_start, "chain_start", DT_U64, 1, { f->chains + 1 } }, FIELD_NEVER },
+		{ { &f->chain_event, "chain_event", DT_U32, 1, { f->chain_events } }, FIELD_EMPTY },
+		{ { &f->chain_count, "chain_count", DT_U32, 1, { f->chain_events } }, FIELD_EMPTY },
+		{ { &f->row_side, "row_side", DT_U32, 1, { f->rows } }, FIELD_EVEN },
+		{ { &f->row_kind, "row_kind", DT_U8, 1, { f->rows } }, FIELD_ZEROS },
+		{ { &f->row_samples, "row_samples", DT_U32, 1, { f->rows } }, FIELD_ZEROS },
+		{ { &f->row_scale, "row_scale", DT_F64, 1, { f->rows } }, FIELD_NEVER },
+		{ { &f->row_residual, "row_residual", DT_F32, 1, { f->rows } }, FIELD_NEVER },
+		{ { &f->row_error, "row_error", DT_F32, 1, { f->rows } }, FIELD_NEVER },
+		{ { &f->row_block, "row_block", DT_U64, 1, { f->rows + 1 } }, FIELD_ORDER },
+		{ { &f->block_chain, "block_chain", DT_U32, 1, { f->blocks } }, FIELD_ZEROS },
+		{ { &f->block_start, "block_start", DT_U64, 1, { f->blocks + 1 } }, FIELD_NEVER },
+		{ { &f->block_column, "block_column", DT_U64, 1, { f->blocks } }, FIELD_NEVER },
+		{ { &f->block_escape, "block_escape", DT_F64, 1, { f->blocks } }, FIELD_ZEROS },
+		{ { &f->block_black, "block_black", DT_F64, 1, { f->blocks } }, FIELD_ZEROS },
+		{ { &f->block_lost, "block_lost", DT_F64, 1, { f->blocks } }, FIELD_ZEROS },
+		{ { &f->block_cut, "block_cut", DT_F64, 1, { f->blocks } }, FIELD_ZEROS },
+		{ { &f->block_arrival, "block_arrival", DT_U64, 1, { f->blocks + 1 } }, FIELD_ZEROS },
+		{ { &f->arrival_target, "arrival_target", DT_U32, 1, { f->arrivals } }, FIELD_EMPTY },
+		{ { &f->arrival_direction, "arrival_direction", DT_F32, 2, { f->arrivals, 3 } }, FIELD_EMPTY },
+		{ { &f->link_target, "link_target", DT_U32, 1, { f->links } }, FIELD_EMPTY },
+		{ { &f->link_source, "link_source", DT_U32, 1, { f->links } }, FIELD_EMPTY },
+		{ { &f->link_last, "link_last", DT_U32, 1, { f->links } }, FIELD_EMPTY },
+		{ { &f->link_chain, "link_chain", DT_U32, 1, { f->links } }, FIELD_EMPTY },
+		{ { &f->link_direction, "link_direction", DT_F32, 2, { f->links, 3 } }, FIELD_EMPTY },
+		{ { &f->link_row, "link_row", DT_U32, 2, { f->links, 2 } }, FIELD_EMPTY },
+		{ { part, "part", DT_U32, 1, { 4 } }, FIELD_NEVER },
+		{ { narrow ? (void *)&f->column16 : (void *)&f->column, "column",
+		  narrow ? DT_U16 : DT_U32, 1, { f->columns } }, FIELD_NEVER },
+		{ { f64 ? (void *)&f->value64 : (void *)&f->value, "value",
+		  f64 ? DT_F64 : DT_F32, 1, { f->entries } }, FIELD_NEVER },
 	};
 
-	return fields_map(c, field, sizeof field / sizeof *field, e);
+	return fields_map_or_make(c, field, sizeof field / sizeof *field, made, e);
 }
 
 static int get_receivers(const struct container *c, struct ff *f, struct err *e)
@@ -86,16 +101,42 @@ static int get_receivers(const struct container *c, struct ff *f, struct err *e)
 	                        text ? text : "missing");
 }
 
-static int map_ff(const struct container *c, struct ff *f, struct err *e)
+static int map_ff(struct ff_file *o, struct err *e)
 {
+	const struct container *c = o->container;
+	struct ff *f = &o->f;
 	uint32_t *part = NULL;
 
-	if (get_receivers(c, f, e) || get_counts(c, f, e) || map_arrays(c, f, &part, e))
+	if (get_receivers(c, f, e) || get_counts(c, f, e) || map_arrays(c, f, &part, &o->made, e))
 		return -1;
 	f->patch_begin = part[0];
 	f->patch_end = part[1];
 	f->part = part[2];
 	f->parts = part[3];
+	return 0;
+}
+
+/* Starts and sides, which may be left out: as many elements in each patch, and the back
+ * of none is modelled. */
+static int map_patches(struct ff_file *o, struct err *e)
+{
+	struct ff_scene *s = &o->scene;
+	uint32_t *start = NULL;
+	uint8_t *sides = NULL;
+	const struct field_or_not field[] = {
+		{ { &start, "patch_start", DT_U32, 1, { s->patches + 1 } }, FIELD_ORDER },
+		{ { &sides, "patch_sides", DT_U8, 1, { s->patches } }, FIELD_ZEROS },
+	};
+
+	if (fields_map_or_make(o->container, field, sizeof field / sizeof *field, &o->made, e))
+		return -1;
+	if (!container_find(o->container, "patch_start"))
+		for (size_t p = 0; p <= s->patches; p++)
+			start[p] *= (uint32_t)(s->patches ? s->elements / s->patches : 0);
+	if (!container_find(o->container, "patch_sides"))
+		memset(sides, 1, s->patches);
+	s->patch_start = start;
+	s->patch_sides = sides;
 	return 0;
 }
 
@@ -117,11 +158,9 @@ static int map_scene(struct ff_file *o, struct err *e)
 	o->patches = (uint32_t)counts[0];
 	const struct field field[] = {
 		{ &s->patch_area, "patch_area", DT_F64, 1, { s->patches } },
-		{ &s->patch_start, "patch_start", DT_U32, 1, { s->patches + 1 } },
-		{ &s->patch_sides, "patch_sides", DT_U8, 1, { s->patches } },
 		{ &o->patch_surface, "patch_surface", DT_U32, 1, { s->patches } },
 	};
-	if (fields_map(c, field, sizeof field / sizeof *field, e))
+	if (fields_map(c, field, sizeof field / sizeof *field, e) || map_patches(o, e))
 		return -1;
 	if (s->patch_start[s->patches] != s->elements)
 		return container_refuse(c, e, "array patch_start: it ends with %" PRIu32 " of %zu "
@@ -159,7 +198,7 @@ static int open_ff(const char *path, const struct model *m, const struct cache_i
 	if (!(o->container = container_open(path, FORMAT, e)) ||
 	    cache_read_info(o->container, &o->info, e) || check_id(o, m_info, e) ||
 	    container_verify_all(o->container, e) || map_scene(o, e) ||
-	    check_patches(o, m, e) || map_ff(o->container, &o->f, e))
+	    check_patches(o, m, e) || map_ff(o, e))
 		return -1;
 	return ff_check(&o->f, &o->scene, &why) ? container_refuse(o->container, e, "%s", why.text)
 	                                        : 0;
@@ -177,6 +216,9 @@ int ff_file_open(const char *path, const struct model *m, const struct cache_inf
 
 void ff_file_close(struct ff_file *f)
 {
+	for (size_t i = 0; i < f->made.n; i++)
+		free(((void **)f->made.data)[i]);
+	free(f->made.data);
 	cache_names_free(f->surface_name, f->surfaces);
 	cache_info_free(&f->info);
 	container_close(f->container);

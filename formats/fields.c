@@ -1,8 +1,7 @@
 #include "fields.h"
 
+#include <stdlib.h>
 #include <string.h>
-
-#include "../lib/mem.h"
 
 int fields_put(struct container_writer *w, const struct field *f, size_t n, struct err *e)
 {
@@ -23,6 +22,49 @@ int fields_map(const struct container *c, const struct field *f, size_t n, struc
 		if (!v)
 			return -1;
 		memcpy(f[i].slot, &v->data, sizeof v->data);
+	}
+	return 0;
+}
+
+static void *make(const struct field *f, enum field_absent absent, struct err *e)
+{
+	const size_t step = absent == FIELD_EVEN ? 2 : absent == FIELD_ORDER ? 1 : 0;
+	size_t n = 1;
+
+	for (int d = 0; d < f->dims; d++)
+		if (__builtin_mul_overflow(n, f->shape[d], &n)) {
+			err_set(e, "array %s: too large", f->name);
+			return NULL;
+		}
+	void *made = mem_new(n, dtype_size(f->type), f->name, e);
+	for (size_t i = 0; made && step && i < n; i++)
+		if (f->type == DT_U64)
+			((uint64_t *)made)[i] = step * i;
+		else
+			((uint32_t *)made)[i] = (uint32_t)(step * i);
+	return made;
+}
+
+int fields_map_or_make(const struct container *c, const struct field_or_not *f, size_t n,
+                       struct vec *made, struct err *e)
+{
+	for (size_t i = 0; i < n; i++) {
+		const struct field *field = &f[i].field;
+		enum field_absent absent = f[i].absent;
+		int may = absent > FIELD_EMPTY || (absent == FIELD_EMPTY && !field->shape[0]);
+		if (!may || container_find(c, field->name)) {
+			if (fields_map(c, field, 1, e))
+				return -1;
+			continue;
+		}
+		void *array = make(field, absent, e);
+		if (!array)
+			return -1;
+		memcpy(field->slot, &array, sizeof array);
+		if (vec_append(made, &array, 1, sizeof array, e)) {
+			free(array);
+			return -1;
+		}
 	}
 	return 0;
 }

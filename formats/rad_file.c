@@ -29,12 +29,13 @@ static size_t solution_fields(struct solution *s, struct plain *plain,
 		{ &s->error_direct, "irradiance_error_direct", DT_F64, 2, { sides, b } },
 		{ &s->discretisation, "irradiance_discretisation", DT_F64, 2, { sides, b } },
 		{ &s->unshot_emission, "unshot_emission", DT_F64, 2, { s->patch_sides, b } },
-		{ &s->unshot_diffuse, "unshot_diffuse", DT_F64, 2, { s->patch_sides, b } },
-		{ &s->unshot_link, "unshot_link", DT_F64, 3, { s->links, 2, b } },
-		{ &s->shot, "shot", DT_F64, 3, { s->rows, 2, b } },
-		{ &s->ledger, "ledger", DT_F64, 2, { LEDGER_TERMS, b } },
-		{ &plain->round, "round", DT_F64, 1, { 2 } },
+		{ &s->unshot_diffuse, "unshot_diffuse", DT_F64, 3, { s->patch_sides, g, b } },
+		{ &s->unshot_link, "unshot_link", DT_F64, 4, { s->links, 2, g, b } },
+		{ &s->shot, "shot", DT_F64, 4, { s->rows, 2, g, b } },
+		{ &s->ledger, "ledger", DT_F64, 3, { LEDGER_TERMS, g, b } },
+		{ &plain->round, "round", DT_F64, 1, { ROUND_TERMS } },
 		{ &plain->shots, "shots", DT_U64, 1, { 1 } },
+		{ &s->emitter_group, "emitter_group", DT_U32, 1, { s->emitters } },
 	};
 
 	memcpy(out, f, sizeof f);
@@ -51,7 +52,8 @@ static int put_solution(struct container_writer *w, const struct model *m,
 
 	if (solution_check(m, s, &why))
 		return err_set(e, "%s: cannot write: %s", container_writer_path(w), why.text);
-	return fields_put(w, f, solution_fields(&view, &plain, f), e) ? -1 : 0;
+	return fields_put(w, f, solution_fields(&view, &plain, f), e) ||
+	       cache_write_names(w, "light_groups", s->group_name, s->groups, e) ? -1 : 0;
 }
 
 int rad_file_write(const char *path, const struct model *m, const struct solution *s,
@@ -80,10 +82,10 @@ static int get_solution(const struct container *c, const struct model *m,
 	int failed;
 
 	*s = (struct solution){ .bands = m->bands, .element_sides = 2 * m->elements,
-	                        .patch_sides = 2 * m->patches };
+	                        .patch_sides = 2 * m->patches, .emitters = m->material.n };
 	if (fields_size(c, "irradiance_direct", DT_F64, 3, 0, &s->groups, e) ||
-	    fields_size(c, "unshot_link", DT_F64, 3, 0, &s->links, e) ||
-	    fields_size(c, "shot", DT_F64, 3, 0, &s->rows, e))
+	    fields_size(c, "unshot_link", DT_F64, 4, 0, &s->links, e) ||
+	    fields_size(c, "shot", DT_F64, 4, 0, &s->rows, e))
 		return -1;
 	if (!(failed = fields_copy(c, f, solution_fields(s, &plain, f), e))) {
 		s->shots = *plain.shots;
@@ -91,7 +93,7 @@ static int get_solution(const struct container *c, const struct model *m,
 	}
 	free(plain.shots);
 	free(plain.round);
-	if (failed)
+	if (failed || cache_read_names(c, "light_groups", &s->group_name, s->groups, e))
 		return -1;
 	return solution_check(m, s, &why) ? container_refuse(c, e, "%s", why.text) : 0;
 }

@@ -59,16 +59,12 @@ int components_init(struct components *c, const struct transport *t, struct err 
 	/* A root is the lowest member, so its number stands before a member asks. */
 	for (uint32_t i = 0; i < sides; i++)
 		c->of[i] = c->of[i] == i ? c->n++ : c->of[c->of[i]];
-	c->emitted = mem_new(c->n, sizeof *c->emitted, "components", e);
-	c->sum = mem_new(c->n, sizeof *c->sum, "components", e);
-	return c->emitted && c->sum ? 0 : -1;
+	return 0;
 }
 
 void components_free(struct components *c)
 {
 	free(c->of);
-	free(c->emitted);
-	free(c->sum);
 	*c = (struct components){ 0 };
 }
 

@@ -7,8 +7,6 @@
 struct components {
 	uint32_t n;
 	uint32_t *of;        /* [2P] component of a patch-side */
-	double *emitted;     /* [n] flux, all bands, filled by the solver */
-	double *sum;         /* [n] scratch */
 };
 
 /* Patch-sides joined by any row, or by transmission through the patch itself.

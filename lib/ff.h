@@ -54,8 +54,8 @@ struct ff {
 	                             many independent rays as gathered values are worth;
 	                             0: all by formula */
 	double *row_scale;
-	double *row_residual;     /* 1 - sum before scaling (raw closure error) */
-	double *row_error;        /* over receiving patch-sides: the root of the summed squares of
+	float *row_residual;      /* 1 - sum before scaling (raw closure error) */
+	float *row_error;         /* over receiving patch-sides: the root of the summed squares of
 	                             standard errors; of a row all by formula the sum of the
 	                             estimated errors */
 	uint64_t *row_block;      /* [rows+1] first block */
@@ -68,12 +68,14 @@ struct ff {
 
 	/* The columns of a block are a list, a word for each entry, or spans: pairs of
 	 * words (first column, count) that stand for the columns first, first + 2, ...,
-	 * the same side of consecutive elements. A block with fewer words than entries
-	 * has spans. Columns ascend by patch-side, then element. Read them by ff_next. */
+	 * the same side of consecutive elements. Blocks may share words. Columns ascend by
+	 * patch-side, then element. Read them by ff_next. */
 	size_t entries, columns;
 	int to_patches;           /* 0: a column is an element-side, 1: a patch-side */
-	uint64_t *block_column;   /* [blocks+1] first word; NULL: all lists, block_start */
-	uint32_t *column;         /* [columns] words */
+	uint64_t *block_column;   /* [blocks] twice the first word, + 1 where spans begin
+	                             there; NULL: all lists, one after the other */
+	uint32_t *column;         /* [columns] words; one of column, column16 is NULL */
+	uint16_t *column16;
 	float *value;             /* one of value, value64 is NULL */
 	double *value64;
 
@@ -103,17 +105,19 @@ static inline double ff_value(const struct ff *f, uint64_t i)
 	return f->value ? (double)f->value[i] : f->value64[i];
 }
 
-/* First words of the blocks, [blocks+1]. */
-static inline const uint64_t *ff_block_column(const struct ff *f)
+static inline uint32_t ff_word(const struct ff *f, uint64_t i)
 {
-	return f->block_column ? f->block_column : f->block_start;
+	return f->column16 ? f->column16[i] : f->column[i];
+}
+
+static inline uint64_t ff_first_word(const struct ff *f, uint64_t block)
+{
+	return f->block_column ? f->block_column[block] >> 1 : f->block_start[block];
 }
 
 static inline int ff_has_spans(const struct ff *f, uint64_t block)
 {
-	const uint64_t *word = ff_block_column(f) + block, *entry = f->block_start + block;
-
-	return word[1] - word[0] < entry[1] - entry[0];
+	return f->block_column && (f->block_column[block] & 1);
 }
 
 /* Neighbouring entries: columns column, column + 2, ... with values from `entry` on. */
@@ -127,30 +131,31 @@ struct ff_span {
  *     for (struct ff_cursor c = ff_begin(f, block); ff_next(&c, &s);)
  * Lists come in spans too, each as long as it can be. f must have passed ff_check. */
 struct ff_cursor {
-	const uint32_t *word, *end;
-	uint64_t entry;
+	const struct ff *f;
+	uint64_t word, entry, end; /* end: of the entries */
 	int spans;
 };
 
 static inline struct ff_cursor ff_begin(const struct ff *f, uint64_t block)
 {
-	const uint64_t *word = ff_block_column(f) + block;
-
-	return (struct ff_cursor){ f->column + word[0], f->column + word[1],
-	                           f->block_start[block], ff_has_spans(f, block) };
+	return (struct ff_cursor){ f, ff_first_word(f, block), f->block_start[block],
+	                           f->block_start[block + 1], ff_has_spans(f, block) };
 }
 
 static inline int ff_next(struct ff_cursor *c, struct ff_span *s)
 {
-	if (c->word == c->end)
+	if (c->entry == c->end)
 		return 0;
-	*s = (struct ff_span){ *c->word++, 1, c->entry };
-	if (c->spans)
-		s->count = *c->word++;
-	else
-		for (; c->word < c->end && *c->word == s->column + 2 * s->count; c->word++)
-			s->count++;
-	c->entry += s->count;
+	*s = (struct ff_span){ ff_word(c->f, c->word++), 1, c->entry++ };
+	if (c->spans) {
+		s->count = ff_word(c->f, c->word++);
+		c->entry = s->entry + s->count;
+		return 1;
+	}
+	for (; c->entry < c->end && ff_word(c->f, c->word) == s->column + 2 * s->count; c->entry++) {
+		s->count++;
+		c->word++;
+	}
 	return 1;
 }
 

@@ -48,13 +48,14 @@ int batch_put_row(struct ff_batch *b, const struct batch_row *r, struct err *e)
 {
 	uint64_t blocks = b->block_chain.n;
 	uint8_t kind = (uint8_t)r->kind;
+	float residual = (float)r->residual, error = (float)r->error;
 
 	return vec_append(&b->row_side, &r->side, 1, sizeof r->side, e) ||
 	       vec_append(&b->row_kind, &kind, 1, sizeof kind, e) ||
 	       vec_append(&b->row_samples, &r->samples, 1, sizeof r->samples, e) ||
 	       vec_append(&b->row_scale, &r->scale, 1, sizeof r->scale, e) ||
-	       vec_append(&b->row_residual, &r->residual, 1, sizeof r->residual, e) ||
-	       vec_append(&b->row_error, &r->error, 1, sizeof r->error, e) ||
+	       vec_append(&b->row_residual, &residual, 1, sizeof residual, e) ||
+	       vec_append(&b->row_error, &error, 1, sizeof error, e) ||
 	       vec_append(&b->row_block, &blocks, 1, sizeof blocks, e) ? -1 : 0;
 }
 

@@ -51,6 +51,11 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 
 /* ---- a job ---- */
 
+static int by_formula(const struct ff_options *o)
+{
+	return o->method == FF_ANALYTIC || o->method == FF_AUTO;
+}
+
 static int job_arrays(struct ff_job *j, struct err *e)
 {
 	size_t sides = 2 * j->m->patches;
@@ -151,12 +156,20 @@ static int job_init(struct ff_job *j, const struct model *m, const struct ff_opt
 	if (job_arrays(j, e) || locator_init(&j->locator, m, e) ||
 	    !(j->rays = ray_scene_new(m, e)))
 		return -1;
-	if (o->method == FF_HEMICUBE && (hemi_grid_init(&j->grid, (int)o->rays, e) ||
-	                                 !(j->cubes = hemi_scene_new(m, e))))
-		return -1;
 	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
 		side_flags(j, ps);
 	ff_element_table(j);
+	return 0;
+}
+
+/* What rows that are computed one by one need beside. */
+static int prepare_rows(struct ff_job *j, struct err *e)
+{
+	if (j->o.method == FF_HEMICUBE && (hemi_grid_init(&j->grid, (int)j->o.rays, e) ||
+	                                   !(j->cubes = hemi_scene_new(j->m, e))))
+		return -1;
+	if (by_formula(&j->o) && ff_formula_init(&j->formula, j->m, j->o.method == FF_ANALYTIC, e))
+		return -1;
 	return make_samples(j, e) || make_places(j, e) ? -1 : 0;
 }
 
@@ -244,14 +257,14 @@ void ff_count(struct ff_stats *s, const struct ff *f)
 	for (size_t r = 0; r < f->rows; r++) {
 		double cut = 0;
 		s->rows[f->row_kind[r]]++;
-		s->worst_residual = fmax(s->worst_residual, fabs(f->row_residual[r]));
+		s->worst_residual = fmax(s->worst_residual, fabs((double)f->row_residual[r]));
 		for (uint64_t b = f->row_block[r]; b < f->row_block[r + 1]; b++)
 			cut += f->block_cut[b] * f->row_scale[r];
 		s->cut = fmax(s->cut, cut);
 		if (f->row_kind[r] == FF_DIFFUSE) {
 			s->samples += f->row_samples[r];
-			s->mean_error += f->row_error[r];
-			s->worst_error = fmax(s->worst_error, f->row_error[r]);
+			s->mean_error += (double)f->row_error[r];
+			s->worst_error = fmax(s->worst_error, (double)f->row_error[r]);
 		}
 	}
 	s->links += f->links;
@@ -374,58 +387,75 @@ static void count_curved(const struct ff_job *j, struct ff_stats *s)
 	}
 }
 
-int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole,
-             struct ff_stats *stats, const struct ff_sink *sink,
-             const struct progress *progress, struct err *e)
+/* All rows, one after the other. */
+static int build_rows(struct ff_job *j, struct ff *whole, struct ff_stats *stats,
+                      const struct ff_sink *sink, const struct progress *progress,
+                      struct err *e)
 {
-	struct ff_job job;
+	int threads = j->o.threads > 0 ? j->o.threads : 1;
 	struct chains chains = { 0 };
-	int threads = o->threads > 0 ? o->threads : 1;
-	struct run run = { .job = &job };
-	int bad = job_init(&job, m, o, e) || chains_init(&chains, m, e);
-	int formula = o->method == FF_ANALYTIC || o->method == FF_AUTO;
-	int matrix = !bad && formula && o->to_patches && ff_matrix_can(&job);
+	struct run run = { .job = j };
+	int bad = prepare_rows(j, e) || chains_init(&chains, j->m, e);
 
-	if (!bad && o->close && !matrix)
-		bad = err_set(e, "--close needs factors to patches by formula (-m auto --to patches) "
-		              "in a model of plane patches without lobes, mirrors and panes");
-	*stats = (struct ff_stats){ 0 };
-	*whole = (struct ff){ .part = o->part, .parts = o->parts };
-	if (!bad && formula)
-		count_curved(&job, stats);
-	whole->patch_begin = (uint32_t)((uint64_t)m->patches * (o->part - 1) / o->parts);
-	whole->patch_end = (uint32_t)((uint64_t)m->patches * o->part / o->parts);
 	run.thread = mem_new((size_t)threads, sizeof *run.thread, "threads", e);
 	run.batch = mem_new(PATCHES_AT_A_TIME, sizeof *run.batch, "batches", e);
 	run.owner = mem_new(PATCHES_AT_A_TIME, sizeof *run.owner, "batches", e);
 	run.err = mem_new(PATCHES_AT_A_TIME, sizeof *run.err, "batches", e);
 	bad = bad || !run.thread || !run.batch || !run.owner || !run.err;
-	if (formula && !matrix)
-		bad = bad || ff_formula_init(&job.formula, m, o->method == FF_ANALYTIC, e);
 	for (int t = 0; !bad && t < threads; t++)
-		bad = thread_init(&run.thread[t], &job, e);
+		bad = thread_init(&run.thread[t], j, e);
 	for (size_t i = 0; !bad && i < PATCHES_AT_A_TIME; i++)
-		run.batch[i].f64 = o->f64;
-	if (matrix)
-		bad = bad || ff_matrix(&job, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
-		      put_chains(whole, &chains, e);
-	else
-		bad = bad || gather(&job, stats, progress, e) ||
-		      all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats,
-	                         sink, progress, e) || put_chains(whole, &chains, e);
+		run.batch[i].f64 = j->o.f64;
+	bad = bad || gather(j, stats, progress, e) ||
+	      all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats, sink,
+	                  progress, e) || put_chains(whole, &chains, e);
 	for (int t = 0; run.thread && t < threads; t++) {
 		stats->rays += run.thread[t].rays;
 		if (run.thread[t].formula)
 			ff_count_pairs(stats, &run.thread[t].formula->counts);
 		thread_free(&run.thread[t]);
 	}
-	if (stats->rows[FF_DIFFUSE])
-		stats->mean_error /= (double)stats->rows[FF_DIFFUSE];
 	free(run.thread);
 	free(run.batch);
 	free(run.owner);
 	free(run.err);
 	chains_free(&chains);
+	return bad ? -1 : 0;
+}
+
+/* The matrix between patches, whose rows have no chains. */
+static int build_matrix(const struct ff_job *j, struct ff *whole, struct ff_stats *stats,
+                        const struct ff_sink *sink, const struct progress *progress,
+                        struct err *e)
+{
+	whole->chains = 1;
+	whole->chain_start = mem_new(2, sizeof *whole->chain_start, "chains", e);
+	return whole->chain_start ? ff_matrix(j, whole->patch_begin, whole->patch_end, sink, stats,
+	                                      progress, e) : -1;
+}
+
+int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole,
+             struct ff_stats *stats, const struct ff_sink *sink,
+             const struct progress *progress, struct err *e)
+{
+	struct ff_job job;
+	int bad = job_init(&job, m, o, e);
+	int matrix = !bad && by_formula(o) && o->to_patches && ff_matrix_can(&job);
+
+	*stats = (struct ff_stats){ 0 };
+	*whole = (struct ff){ .part = o->part, .parts = o->parts };
+	whole->patch_begin = (uint32_t)((uint64_t)m->patches * (o->part - 1) / o->parts);
+	whole->patch_end = (uint32_t)((uint64_t)m->patches * o->part / o->parts);
+	if (!bad && o->close && !matrix)
+		bad = err_set(e, "--close needs factors to patches by formula (-m auto --to patches) "
+		              "in a model without lobes, mirrors and panes");
+	if (!bad && by_formula(o))
+		count_curved(&job, stats);
+	if (!bad)
+		bad = matrix ? build_matrix(&job, whole, stats, sink, progress, e)
+		             : build_rows(&job, whole, stats, sink, progress, e);
+	if (stats->rows[FF_DIFFUSE])
+		stats->mean_error /= (double)stats->rows[FF_DIFFUSE];
 	job_free(&job);
 	return bad ? -1 : 0;
 }

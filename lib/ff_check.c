@@ -12,6 +12,14 @@ static const double closure_slack = 1e-9;
 /* Directions are float32. */
 static const double unit_slack = 1e-3;
 
+static int not_negative_f32(const char *name, const float *v, size_t n, struct err *e)
+{
+	for (size_t i = 0; i < n; i++)
+		if (!(v[i] >= 0 && isfinite(v[i])))
+			return err_set(e, "array %s: value %zu is %g", name, i, (double)v[i]);
+	return 0;
+}
+
 static int not_negative(const char *name, const double *v, size_t n, struct err *e)
 {
 	for (size_t i = 0; i < n; i++)
@@ -96,7 +104,8 @@ static int check_row(const struct ff *f, size_t r, struct err *e)
 	if (!(f->row_scale[r] > 0 && isfinite(f->row_scale[r])))
 		return err_set(e, "array row_scale: value %zu is %g", r, f->row_scale[r]);
 	if (!isfinite(f->row_residual[r]))
-		return err_set(e, "array row_residual: value %zu is %g", r, f->row_residual[r]);
+		return err_set(e, "array row_residual: value %zu is %g", r,
+		               (double)f->row_residual[r]);
 	return 0;
 }
 
@@ -120,11 +129,9 @@ static int check_rows(const struct ff *f, struct err *e)
 {
 	if (check_starts("row_block", f->row_block, f->rows, f->blocks, 1, e) ||
 	    check_starts("block_start", f->block_start, f->blocks, f->entries, 0, e) ||
-	    (f->block_column &&
-	     check_starts("block_column", f->block_column, f->blocks, f->columns, 0, e)) ||
 	    check_starts("block_arrival", f->block_arrival, f->blocks, f->arrivals, 0, e) ||
 	    check_below("block_chain", f->block_chain, f->blocks, f->chains, e) ||
-	    not_negative("row_error", f->row_error, f->rows, e) ||
+	    not_negative_f32("row_error", f->row_error, f->rows, e) ||
 	    not_negative("block_escape", f->block_escape, f->blocks, e) ||
 	    not_negative("block_black", f->block_black, f->blocks, e) ||
 	    not_negative("block_lost", f->block_lost, f->blocks, e) ||
@@ -175,36 +182,43 @@ static int check_span(const struct columns *c, uint64_t word, uint32_t first, ui
 	return 0;
 }
 
-static int check_spans(const struct columns *c, uint64_t b, struct err *e)
+static uint64_t words(const struct ff *f)
+{
+	return f->block_column ? f->columns : f->entries;
+}
+
+/* `left` values from word w on. */
+static int check_spans(const struct columns *c, uint64_t b, uint64_t w, uint64_t left,
+                       struct err *e)
 {
 	const struct ff *f = c->f;
-	uint64_t last = 0, left = f->block_start[b + 1] - f->block_start[b];
+	uint64_t last = 0;
 
-	if ((f->block_column[b + 1] - f->block_column[b]) % 2)
-		return err_set(e, "array block_column: block %" PRIu64 " has an odd number of words "
-		               "for spans", b);
-	for (uint64_t w = f->block_column[b]; w < f->block_column[b + 1]; w += 2) {
-		uint32_t count = f->column[w + 1];
-		if (check_span(c, w, f->column[w], count, &last, e))
+	for (; left; w += 2) {
+		if (words(f) - w < 2)
+			return err_set(e, "array block_column: block %" PRIu64 " ends beyond the last "
+			               "column", b);
+		uint32_t count = ff_word(f, w + 1);
+		if (check_span(c, w, ff_word(f, w), count, &last, e))
 			return -1;
 		if (count > left)
 			return err_set(e, "array column: value %" PRIu64 " is %" PRIu32 ", with which "
 			               "block %" PRIu64 " has more columns than values", w + 1, count, b);
 		left -= count;
 	}
-	if (left)
-		return err_set(e, "array column: block %" PRIu64 " has %" PRIu64 " values too many", b,
-		               left);
 	return 0;
 }
 
-static int check_list(const struct columns *c, uint64_t b, struct err *e)
+static int check_list(const struct columns *c, uint64_t b, uint64_t w, uint64_t n,
+                      struct err *e)
 {
-	const uint64_t *word = ff_block_column(c->f) + b;
 	uint64_t last = 0;
 
-	for (uint64_t w = word[0]; w < word[1]; w++)
-		if (check_span(c, w, c->f->column[w], 1, &last, e))
+	if (n > words(c->f) - w)
+		return err_set(e, "array block_column: block %" PRIu64 " ends beyond the last column",
+		               b);
+	for (uint64_t end = w + n; w < end; w++)
+		if (check_span(c, w, ff_word(c->f, w), 1, &last, e))
 			return -1;
 	return 0;
 }
@@ -212,12 +226,12 @@ static int check_list(const struct columns *c, uint64_t b, struct err *e)
 static int check_columns(const struct columns *c, uint64_t b, struct err *e)
 {
 	const struct ff *f = c->f;
-	const uint64_t *word = ff_block_column(f) + b;
+	uint64_t first = ff_first_word(f, b), n = f->block_start[b + 1] - f->block_start[b];
 
-	if (word[1] - word[0] > f->block_start[b + 1] - f->block_start[b])
-		return err_set(e, "array block_column: block %" PRIu64 " has more columns than values",
+	if (first > words(f))
+		return err_set(e, "array block_column: block %" PRIu64 " begins beyond the last column",
 		               b);
-	return ff_has_spans(f, b) ? check_spans(c, b, e) : check_list(c, b, e);
+	return ff_has_spans(f, b) ? check_spans(c, b, first, n, e) : check_list(c, b, first, n, e);
 }
 
 /* Finite values >= 0 that sum to *sum. */

@@ -20,6 +20,9 @@ static const double larger = 2.2, enough = .11;
 /* How far the sum of gathered factors may be from what must land there. */
 static const double misfit = .25;
 
+/* Stated errors beyond which something is sure. */
+static const double certain = 4;
+
 /* Looking at an element from afar takes so much less time than a ray. */
 enum { LOOKS_A_RAY = 4, ELEMENTS_A_PATCH = 5 };
 
@@ -395,24 +398,34 @@ static double brought(const struct ff_thread *t, uint32_t ps, uint32_t cast)
 	return sum / cast;
 }
 
-/* The same without rays of its own: what neither escapes nor meets a black side, or the
- * sum of what elements see, each for as much as it is certain. Books the rest. */
-static double not_lost(struct ff_thread *t, uint32_t ps, double sum, double variance)
-{
-	const struct ff_job *j = t->job;
-	const uint32_t *start = &j->m->patch_start[ps >> 1];
-	double escape = j->gather.escape[ps], black = j->gather.black[ps];
-	double rays = 0;
-	for (uint32_t i = start[0]; i < start[1]; i++)
-		rays += j->gather.rays[i];
-	double own = escape * (1 - escape) / rays;
-	double lands = 1 - escape - black;
+/* What sights of elements add up to, and how sure it is. */
+struct tale {
+	double sum, variance;
+	double doubt;             /* summed standard errors */
+};
 
-	if (own > 0)
-		lands = fmin(1 - black, (lands * variance + sum * own) / (variance + own));
-	tally_rest(&t->tally, 0)->escape = fmax(0, 1 - black - lands);
-	tally_rest(&t->tally, 0)->black = black;
-	return lands;
+static struct tale add_up(const struct ff_thread *t, double sum)
+{
+	const struct ff_sight *s = t->sights.data;
+	struct tale a = { .sum = sum };
+
+	for (size_t i = 0; i < t->sights.n; i++) {
+		a.variance += s[i].variance;
+		a.doubt += sqrt(s[i].variance);
+	}
+	return a;
+}
+
+/* The part of a row that lands on elements, of which so many rays say `lands`: the mean of
+ * that and of what the elements' sights add up to, each for as much as it is certain. Where
+ * no ray goes elsewhere, so it is, if the sights do not surely deny it. */
+static double settle(double lands, double rays, const struct tale *a)
+{
+	double own = fmax(lands * (1 - lands), 1 / rays) / rays;
+
+	if (lands >= 1 && fabs(1 - a->sum) <= certain * a->doubt)
+		return 1;
+	return fmin(1, (lands * a->variance + a->sum * own) / (a->variance + own));
 }
 
 /* Where no ray of the row's own tells from where light comes to a lobe. */
@@ -440,26 +453,46 @@ static void put_sights(struct ff_thread *t, uint32_t ps, double scale)
 	}
 }
 
+/* Of what does not land, how much escapes and how much meets black sides, as the rays of the
+ * patch's elements say. */
+static void book_lost(struct ff_thread *t, uint32_t ps, double lost)
+{
+	double escape = t->job->gather.escape[ps], black = t->job->gather.black[ps];
+	double part = escape + black > 0 ? black / (escape + black) : 0;
+
+	*tally_rest(&t->tally, 0) = (struct tally_rest){ .escape = lost * (1 - part),
+	                                                 .black = lost * part };
+}
+
+/* What rays say of all that lands; how many they are. */
+static double landing(const struct ff_thread *t, uint32_t ps, uint32_t cast, double *rays)
+{
+	const struct ff_job *j = t->job;
+	const uint32_t *start = &j->m->patch_start[ps >> 1];
+
+	*rays = cast;
+	for (uint32_t i = start[0]; !cast && i < start[1]; i++)
+		*rays += j->gather.rays[i];
+	return cast ? brought(t, ps, cast) : 1 - j->gather.escape[ps] - j->gather.black[ps];
+}
+
 int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_weight *w)
 {
 	const struct ff_job *j = t->job;
-	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
-	int seen = ff_row_is_seen(j, ps);
-	double sum = seen ? ff_see(t, ps, rays, &t->tally.err) : recall(t, ps);
-	double variance = 0, total = cast ? cast : 1;
+	uint32_t wanted = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
+	double sum = ff_row_is_seen(j, ps) ? ff_see(t, ps, wanted, &t->tally.err) : recall(t, ps);
+	struct tale a = add_up(t, sum);
+	double rays, said = landing(t, ps, cast, &rays), lands = settle(said, rays, &a);
 
-	for (size_t i = 0; i < t->sights.n; i++)
-		variance += ((const struct ff_sight *)t->sights.data)[i].variance;
-	double lands = cast ? brought(t, ps, cast) : not_lost(t, ps, sum, variance);
 	if (t->tally.err.set || !(lands > 0 && sum > 0) ||
-	    fabs(sum - lands) > misfit * lands + 3 * sqrt(lands / rays)) {
-		if (!cast)
-			*tally_rest(&t->tally, 0) = (struct tally_rest){ 0 };
+	    fabs(sum - said) > misfit * said + 3 * sqrt(fmax(sum, said) / rays))
 		return 0;
-	}
+	/* What rays brought elsewhere stays as it is: the whole is what makes that 1 - lands. */
+	double total = !cast ? 1 : said < 1 && lands < 1 ? cast * (1 - said) / (1 - lands) : cast;
+	if (!cast)
+		book_lost(t, ps, 1 - lands);
 	put_sights(t, ps, total * lands / sum);
-	if (cast)
-		variance += (1 - lands) / cast;
+	double variance = a.variance + (cast ? (1 - lands) / cast : 0);
 	*w = (struct ff_weight){ (uint32_t)fmax(1, fmin(UINT32_MAX, 1 / variance)), total };
 	return 1;
 }

@@ -125,6 +125,13 @@ void ff_element_table(struct ff_job *j);
  * position (on the surface, not moved off it). */
 uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, double x[3]);
 
+/* The scramble of a replicate of the rays of a row; row: twice its patch-side, and 1 more
+ * for its emission. */
+struct ff_scramble {
+	uint32_t seed[FF_DIMS];
+};
+struct ff_scramble ff_scramble(const struct ff_job *j, uint32_t row, uint32_t replicate);
+
 /* The numbers of rays first to first + n (n <= RAY_BATCH) of a scrambled replicate. */
 void ff_batch_numbers(const struct ff_samples *s, const uint32_t seed[4], uint32_t first,
                       uint32_t n, struct ff_batch_rays *b);

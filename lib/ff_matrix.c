@@ -6,14 +6,14 @@
 
 #include "exchange.h"
 #include "ff_close.h"
-#include "lobe.h"
-#include "vec3.h"
+#include "ff_rest.h"
 
 enum { BAND_BYTES = 192 << 20, ROWS_AT_A_TIME = 64, TILE = 32, REST_RAYS = 256,
        CROWD_RAYS = 1024, CERTAIN = 4 };
 
 struct thread {
 	struct exchanger x;
+	struct ff_rest rest;
 	struct vec doubt;             /* struct doubt */
 	struct err e;
 };
@@ -23,6 +23,7 @@ struct matrix {
 	uint32_t *side;               /* [n] modelled patch-sides */
 	size_t n;
 	double *area;                 /* [n] */
+	int curved;                   /* some side is: it has no facets, its pairs are by rays */
 	struct facet_set facets;
 	struct body_set bodies;
 	double centre[3];
@@ -124,58 +125,72 @@ static int gather_doubts(struct matrix *m, struct err *e)
 
 /* ---- rows ---- */
 
-/* What of a few rays from a side leaves the scene and meets black backs. */
-static void rest(const struct matrix *m, uint32_t ps, uint32_t *escapes, uint32_t *blacks)
+static int is_curved(const struct matrix *m, size_t i)
 {
-	const struct ff_job *j = m->job;
-	uint64_t seed = rng_mix(j->o.seed ^ ((uint64_t)ps << 20));
+	return m->facets.start[m->side[i] + 1] == m->facets.start[m->side[i]];
+}
 
-	*escapes = *blacks = 0;
-	for (uint32_t i = 0; i < REST_RAYS; i++) {
-		double x[3], n[3], dir[3], u[2] = { rng_sobol(i, 2, seed), rng_sobol(i, 3, seed) };
-		struct ray_hit hit;
-		uint32_t element = ff_point(j, ps >> 1, rng_sobol(i, 0, seed), rng_sobol(i, 1, seed), x);
-		ff_normal(j, element, (int)(ps & 1), n);
-		lobe_sample_cosine(n, u, dir);
-		ray_leave(j->rays, n, x);
-		ray_nearest(j->rays, x, dir, &hit);
-		if (hit.triangle == RAY_MISS)
-			++*escapes;
-		else
-			*blacks += j->is_black[2 * j->m->element_patch[locate(&j->locator, hit.triangle,
-			                                      (float)hit.w[1], (float)hit.w[2])] +
-			                       (uint32_t)hit.side];
+/* Gives what formulas leave of a row to where its rays go that formulas know nothing of:
+ * curved patches (to a curved one, all), the outside, black backs. Returns how many rays
+ * these are. */
+static double share_rest(struct matrix *m, size_t r, struct ff_rest *rest)
+{
+	struct batch_row *row = &m->row[r];
+	size_t i = m->first + r;
+	uint32_t emits = m->job->emits[row->side];
+	uint32_t rays = m->curved ? m->job->o.rays * (emits ? m->job->o.emitter_gain : 1) : REST_RAYS;
+	int all = is_curved(m, i);
+	double lost, hits = 0, variance = 0;
+
+	ff_rest_cast(rest, m->job, row->side, rays);
+	lost = rest->escaped + rest->black;
+	for (size_t j = 0; m->curved && j < m->n; j++)
+		hits += all || is_curved(m, j) ? ff_rest_landed(rest, m->side[j]) : 0;
+	if (!(hits + lost > 0))
+		return 0;
+	double each = row->residual / (hits + lost);
+	for (size_t j = 0; hits > 0 && j < m->n; j++)
+		if (all || is_curved(m, j)) {
+			set(m, r, j, each * ff_rest_landed(rest, m->side[j]) * m->area[i]);
+			variance += each * each * ff_rest_variance(rest, m->side[j]);
+		}
+	if (hits > 0) {
+		/* All rays in one place tell no more than a ray's weight. */
+		row->error = fmax(sqrt(row->error * row->error + variance), each);
+		row->samples = rays;
 	}
+	m->rest[r] = (struct tally_rest){ .escape = each * rest->escaped, .black = each * rest->black };
+	return hits + lost;
 }
 
 /* What a row says beside its values. What is missing of a closed row is its error; of
- * others, what nothing received. */
-static void judge(struct matrix *m, size_t r)
+ * others, what nothing received by formula. */
+static void judge(struct matrix *m, size_t r, struct ff_rest *rest)
 {
 	struct batch_row *row = &m->row[r];
 	double area = m->area[m->first + r], sum = 0;
-	uint32_t escapes = 0, blacks = 0;
 
 	for (size_t j = 0; j < m->n; j++)
 		sum += get(m, r, j) / area;
 	row->side = m->side[m->first + r];
 	row->residual = 1 - sum;
 	row->error = row->error / area + m->thread[0].x.o.relative * sum;
-	if (row->residual > 0)
-		rest(m, row->side, &escapes, &blacks);
-	m->closed[r] = !(escapes + blacks) && row->residual <= CERTAIN * row->error;
-	if (m->closed[r])
-		return;
-	double black = escapes + blacks ? row->residual * blacks / (escapes + blacks) : 0;
-	m->rest[r] = (struct tally_rest){ .escape = row->residual - black, .black = black };
-	row->residual = 0;
+	if (row->residual > 0 && share_rest(m, r, rest) > 0)
+		row->residual = 0;
+	else if (row->residual <= CERTAIN * row->error)
+		m->closed[r] = 1;
+	else {
+		m->rest[r].escape = row->residual;
+		row->residual = 0;
+	}
 }
 
 static void judge_rows(void *arg, size_t begin, size_t end, int thread)
 {
-	(void)thread;
+	struct matrix *m = arg;
+
 	for (size_t r = begin; r < end; r++)
-		judge(arg, r);
+		judge(m, r, &m->thread[thread].rest);
 }
 
 static void judge_all(struct matrix *m)
@@ -184,6 +199,7 @@ static void judge_all(struct matrix *m)
 
 	memset(m->row, 0, m->rows * sizeof *m->row);
 	memset(m->rest, 0, m->rows * sizeof *m->rest);
+	memset(m->closed, 0, m->rows);
 	for (size_t k = 0; k < m->doubt.n; k++) {
 		size_t i = d[k].i - m->first, j = d[k].j - m->first; /* beyond rows if outside */
 		if (i < m->rows)
@@ -306,15 +322,12 @@ static int find_sides(struct matrix *m, struct err *e)
 	return 0;
 }
 
-/* Plane patches only, and nothing that sends light on but by Lambert's law. */
+/* Nothing sends light on but by Lambert's law. */
 int ff_matrix_can(const struct ff_job *j)
 {
-	const struct model *m = j->m;
-
-	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
-		if (model_side_modelled(m, ps) &&
-		    (m->patch_loop[(ps >> 1) + 1] == m->patch_loop[ps >> 1] || j->is_ideal[ps] ||
-		     j->has_lobe[ps] || j->shoots_lobe[ps]))
+	for (uint32_t ps = 0; ps < 2 * j->m->patches; ps++)
+		if (model_side_modelled(j->m, ps) &&
+		    (j->is_ideal[ps] || j->has_lobe[ps] || j->shoots_lobe[ps]))
 			return 0;
 	return 1;
 }
@@ -331,10 +344,14 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
 	          body_set_init(&m.bodies, j->m, e);
 
 	facet_centre(j->m, m.centre);
+	for (size_t i = 0; !bad && i < m.n; i++)
+		m.curved |= is_curved(&m, i);
 	m.thread = mem_new((size_t)j->o.threads, sizeof *m.thread, "threads", e);
 	bad = bad || !m.thread;
-	for (int t = 0; !bad && t < j->o.threads; t++)
+	for (int t = 0; !bad && t < j->o.threads; t++) {
 		exchanger_init(&m.thread[t].x, &o, &m.bodies, j->rays, m.centre);
+		bad = ff_rest_init(&m.thread[t].rest, j, e);
+	}
 	while (a < m.n && m.side[a] < 2 * begin)
 		a++;
 	for (b = a; b < m.n && m.side[b] < 2 * end;)
@@ -342,7 +359,9 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
 	bad = bad || bands(&m, a, b, sink, stats, progress, e);
 	for (int t = 0; m.thread && t < j->o.threads; t++) {
 		ff_count_pairs(stats, &m.thread[t].x.counts);
+		stats->rays += m.thread[t].rest.rays;
 		exchanger_free(&m.thread[t].x);
+		ff_rest_free(&m.thread[t].rest);
 		free(m.thread[t].doubt.data);
 	}
 	free(m.thread);

@@ -163,13 +163,9 @@ void ff_follow_on(struct ff_thread *t, const double org[3], const double dir[3],
 
 /* ---- rows ---- */
 
-struct scramble {
-	uint32_t seed[FF_DIMS];
-};
-
-static struct scramble scramble(const struct ff_job *j, uint32_t row, uint32_t replicate)
+struct ff_scramble ff_scramble(const struct ff_job *j, uint32_t row, uint32_t replicate)
 {
-	struct scramble s;
+	struct ff_scramble s;
 	uint64_t seed = rng_mix(rng_mix(j->o.seed) ^ rng_mix(((uint64_t)row << 8) | replicate));
 
 	for (int d = 0; d < FF_DIMS; d++)
@@ -286,7 +282,7 @@ static void cast(struct ff_thread *t, uint32_t ps, uint32_t count, double expone
 	struct ff_batch_rays b;
 
 	for (uint32_t r = 0; r < FF_REPLICATES; r++) {
-		struct scramble s = scramble(j, 2 * ps + (exponent >= 0), r);
+		struct ff_scramble s = ff_scramble(j, 2 * ps + (exponent >= 0), r);
 		for (uint32_t first = 0; first < each; first += RAY_BATCH) {
 			uint32_t n = each - first < RAY_BATCH ? each - first : RAY_BATCH;
 			ff_batch_numbers(samples, s.seed, first, n, &b);

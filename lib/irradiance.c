@@ -39,7 +39,7 @@ struct gather {
 	struct solution *s;
 	int to_patches;
 	size_t receivers;            /* elements or patches, 2 sides each */
-	const double *block_flux[2]; /* [blocks][bands] by freshness, over the block's sum */
+	const double *block_flux[2]; /* [blocks][channels] by freshness, over the block's sum */
 	size_t ranges;               /* one a thread */
 	uint32_t *cut;               /* [ranges+1] receivers */
 	size_t feeds;
@@ -48,7 +48,8 @@ struct gather {
 	lanes_f32 *variance[2];      /* [2][receivers], in units of `unit`: of rows that bring
 	                                direct light, and of others */
 	double unit;                 /* the largest that a whole block adds */
-	int first_band;              /* of the four in work */
+	size_t channels;
+	size_t first;                /* channel of the four in work */
 	double bytes;
 };
 
@@ -77,11 +78,13 @@ static ALWAYS_INLINE void add_list(const struct gather *g, const struct feed *x,
                                    int f32, int fresh, int mixed)
 {
 	const struct ff *f = x->f;
-	const uint32_t *column = f->column + p.word;
 	const uint64_t n = f->block_start[x->block + 1] - p.entry;
 
-	for (uint64_t i = 0; i < n && column[i] >> 1 < below; i++) {
-		size_t at = (column[i] >> 1) + (column[i] & 1 ? g->receivers : 0);
+	for (uint64_t i = 0; i < n; i++) {
+		uint32_t column = ff_word(f, p.word + i);
+		if (column >> 1 >= below)
+			break;
+		size_t at = (column >> 1) + (column & 1 ? g->receivers : 0);
 		double v = f32 ? (double)f->value[p.entry + i] : f->value64[p.entry + i];
 		add(x, to, at, v, fresh, mixed);
 	}
@@ -92,15 +95,16 @@ static ALWAYS_INLINE void add_spans(const struct gather *g, const struct feed *x
                                     int f32, int fresh, int mixed)
 {
 	const struct ff *f = x->f;
-	const uint64_t end = ff_block_column(f)[x->block + 1];
+	const uint64_t end = f->block_start[x->block + 1];
 
-	for (; p.word < end; p.word += 2, p.done = 0) {
-		uint32_t first = (f->column[p.word] >> 1) + p.done;
-		uint32_t last = first + f->column[p.word + 1] - p.done;
-		size_t back = f->column[p.word] & 1 ? g->receivers : 0;
+	for (int cut = 0; p.entry < end && !cut; p.word += 2, p.done = 0) {
+		uint32_t column = ff_word(f, p.word), first = (column >> 1) + p.done;
+		uint32_t last = first + ff_word(f, p.word + 1) - p.done;
+		size_t back = column & 1 ? g->receivers : 0;
 		if (first >= below)
 			break;
-		if (last > below)
+		cut = last > below;
+		if (cut)
 			last = below;
 		for (size_t at = first + back; at < last + back; at++, p.entry++) {
 			double v = f32 ? (double)f->value[p.entry] : f->value64[p.entry];
@@ -138,10 +142,10 @@ static void add_feed(const struct gather *g, const struct feed *x, struct place 
 static void seek_span(const struct feed *x, uint32_t receiver, struct place *p)
 {
 	const struct ff *f = x->f;
-	const uint64_t end = ff_block_column(f)[x->block + 1];
+	const uint64_t end = f->block_start[x->block + 1];
 
-	for (; p->word < end; p->word += 2) {
-		uint32_t first = f->column[p->word] >> 1, count = f->column[p->word + 1];
+	for (; p->entry < end; p->word += 2) {
+		uint32_t first = ff_word(f, p->word) >> 1, count = ff_word(f, p->word + 1);
 		if (first >= receiver)
 			return;
 		p->done = receiver - first < count ? receiver - first : 0;
@@ -154,12 +158,11 @@ static void seek_span(const struct feed *x, uint32_t receiver, struct place *p)
 /* Ranges are whole patches: both sides of a patch are on one side of a bound. */
 static void seek_word(const struct feed *x, uint32_t receiver, struct place *p)
 {
-	const uint32_t *word = x->f->column + p->word;
-	uint64_t n = ff_block_column(x->f)[x->block + 1] - p->word, at = 0;
+	uint64_t n = x->f->block_start[x->block + 1] - p->entry, at = 0;
 
 	while (n) {
 		uint64_t half = n / 2;
-		int below = word[at + half] >> 1 < receiver;
+		int below = ff_word(x->f, p->word + at + half) >> 1 < receiver;
 		at += below ? half + 1 : 0;
 		n = below ? n - half - 1 : half;
 	}
@@ -171,13 +174,13 @@ static void seek_word(const struct feed *x, uint32_t receiver, struct place *p)
 static struct place find_place(const struct feed *x, uint32_t receiver)
 {
 	const struct ff *f = x->f;
-	struct place p = { ff_block_column(f)[x->block], f->block_start[x->block], 0 };
+	struct place p = { ff_first_word(f, x->block), f->block_start[x->block], 0 };
 
 	if (receiver && ff_has_spans(f, x->block))
 		seek_span(x, receiver, &p);
 	else if (receiver)
 		seek_word(x, receiver, &p);
-	__builtin_prefetch(f->column + p.word);
+	__builtin_prefetch(f->column16 ? (const void *)(f->column16 + p.word) : f->column + p.word);
 	__builtin_prefetch(f->value ? (const void *)(f->value + p.entry) : f->value64 + p.entry);
 	return p;
 }
@@ -205,19 +208,23 @@ static enum part part_of(const struct transport *t, uint32_t row, uint32_t chain
 	return chain == 0 && t->row_kind[row] <= FF_EMISSION ? DIRECT : CAUSTIC;
 }
 
-/* Variance of an element's irradiance from the sampling of the rows, as if each
- * sample were independent (stratification makes it smaller): a row of n samples
- * that sends flux U, of which f lands here, adds U^2 f / n; one without samples, 0. */
+/* Variance of an element's irradiance, all groups together, from the sampling of the
+ * rows, as if each sample were independent (stratification makes it smaller): a row of n
+ * samples that sends flux U, of which f lands here, adds U^2 f / n; one without samples,
+ * 0. For the four bands with the number of the channels in work. */
 static lanes variance_of(const struct gather *g, uint32_t row, uint64_t b)
 {
 	const struct transport *t = g->t;
 	uint32_t samples = t->row_samples[row];
+	size_t bands = (size_t)g->s->bands;
 	double one = samples ? t->block[t->row_block[row]].sum / samples : 0;
 	lanes v = { 0 };
 
-	for (int k = 0; k < LANES && g->first_band + k < g->s->bands; k++) {
-		size_t at = b * (size_t)g->s->bands + (size_t)(g->first_band + k);
-		double all = g->block_flux[0][at] + g->block_flux[1][at];
+	for (size_t k = 0; k < LANES && g->first + k < bands; k++) {
+		double all = 0;
+		for (size_t c = g->first + k; c < g->channels; c += bands)
+			all += g->block_flux[0][b * g->channels + c] +
+			       g->block_flux[1][b * g->channels + c];
 		v[k] = all * all * one;
 	}
 	return v;
@@ -243,32 +250,33 @@ static void set_feed(const struct gather *g, uint32_t row, uint64_t b, uint8_t c
                      struct feed *x)
 {
 	const struct block *block = &g->t->block[b];
-	size_t at = b * (size_t)g->s->bands + (size_t)g->first_band;
+	size_t at = b * g->channels + g->first;
 
 	*x = (struct feed){ .f = g->t->shard[block->shard], .block = block->local,
 	                    .to_fresh = (uint8_t)part_of(g->t, row, block->chain),
 	                    .carries = carries };
-	for (int k = 0; k < LANES && g->first_band + k < g->s->bands; k++) {
-		x->fresh[k] = g->block_flux[0][at + (size_t)k];
-		x->mixed[k] = g->block_flux[1][at + (size_t)k];
+	for (size_t k = 0; k < LANES && g->first + k < g->channels; k++) {
+		x->fresh[k] = g->block_flux[0][at + k];
+		x->mixed[k] = g->block_flux[1][at + k];
 	}
 	x->variance = __builtin_convertvector(variance_of(g, row, b) * (1 / g->unit), lanes_f32);
 }
 
-/* Blocks with flux in the four bands in work. */
+/* Blocks with flux in the four channels in work, or any where they have variances. */
 static void set_feeds(struct gather *g)
 {
 	const struct transport *t = g->t;
-	size_t bands = (size_t)g->s->bands;
+	const size_t last = g->first < (size_t)g->s->bands ? g->channels : g->first + LANES;
 
 	g->feeds = 0;
 	for (uint32_t row = 0; row < t->rows; row++)
 		for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
 			unsigned carries = 0;
-			for (size_t k = (size_t)g->first_band; k < bands &&
-			     k < (size_t)g->first_band + LANES; k++)
-				carries |= (g->block_flux[0][b * bands + k] > 0) |
-				           (unsigned)(g->block_flux[1][b * bands + k] > 0) << 1;
+			for (size_t c = g->first; c < last && c < g->channels; c++) {
+				size_t at = b * g->channels + c;
+				carries |= (g->block_flux[0][at] > 0) |
+				           (unsigned)(g->block_flux[1][at] > 0) << 1;
+			}
 			if (carries)
 				set_feed(g, row, b, (uint8_t)carries, &g->feed[g->feeds++]);
 		}
@@ -276,7 +284,7 @@ static void set_feeds(struct gather *g)
 
 /* ---- irradiance ---- */
 
-static void put_bands(void *arg, size_t begin, size_t end, int thread)
+static void put_channels(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct gather *g = arg;
 	const struct model *m = g->t->m;
@@ -286,37 +294,41 @@ static void put_bands(void *arg, size_t begin, size_t end, int thread)
 	(void)thread;
 	for (size_t es = begin; es < end; es++) {
 		uint32_t element = (uint32_t)(es >> 1), patch = m->element_patch[element];
-		size_t side = (es & 1) * g->receivers, at = es * bands + (size_t)g->first_band;
+		size_t side = (es & 1) * g->receivers;
 		size_t from = side + (g->to_patches ? patch : element);
 		double area = g->to_patches ? m->patch_area[patch] : m->element_area[element];
-		for (int k = 0; k < LANES && g->first_band + k < g->s->bands; k++, at++) {
+		for (size_t k = 0; k < LANES && g->first + k < g->channels; k++) {
+			size_t c = g->first + k;
+			size_t at = (c / bands * g->s->element_sides + es) * bands + c % bands;
 			for (int p = 0; p < H_PARTS; p++)
 				to[p][at] = g->flux[p][from][k] / area;
-			double direct = (double)g->variance[0][from][k] * g->unit;
-			double other = (double)g->variance[1][from][k] * g->unit;
-			g->s->error_direct[at] = sqrt(direct) / area;
-			g->s->error[at] = sqrt(direct + other) / area;
+			if (c < bands) {
+				double direct = (double)g->variance[0][from][k] * g->unit;
+				double other = (double)g->variance[1][from][k] * g->unit;
+				g->s->error_direct[at] = sqrt(direct) / area;
+				g->s->error[at] = sqrt(direct + other) / area;
+			}
 		}
 	}
 }
 
-/* Bytes of the columns and values that are read. */
+/* Bytes of the values that are read and, where columns are lists, of these. */
 static double bytes_of(const struct gather *g)
 {
 	double bytes = 0;
 
 	for (size_t i = 0; i < g->feeds; i++) {
 		const struct ff *f = g->feed[i].f;
-		const uint64_t *word = ff_block_column(f) + g->feed[i].block;
 		const uint64_t *entry = f->block_start + g->feed[i].block;
-		bytes += (double)(word[1] - word[0]) * sizeof *f->column +
-		         (double)(entry[1] - entry[0]) *
-		         (f->value ? sizeof *f->value : sizeof *f->value64);
+		size_t word = f->column16 ? sizeof *f->column16 : sizeof *f->column;
+		size_t value = f->value ? sizeof *f->value : sizeof *f->value64;
+		bytes += (double)(entry[1] - entry[0]) *
+		         (double)(value + (ff_has_spans(f, g->feed[i].block) ? 0 : word));
 	}
 	return bytes;
 }
 
-static int gather_bands(struct gather *g, int threads, struct err *e)
+static int gather_channels(struct gather *g, int threads, struct err *e)
 {
 	size_t n = 2 * g->receivers;
 	void *room, *variance, *feed;
@@ -329,16 +341,15 @@ static int gather_bands(struct gather *g, int threads, struct err *e)
 	int bad = !at || !variance || !g->feed;
 	for (int p = 0; !bad && p < H_PARTS; p++)
 		g->flux[p] = at + (size_t)p * n;
-	for (g->first_band = 0; !bad && g->first_band < g->s->bands;
-	     g->first_band += LANES) {
-		if (g->first_band) {
+	for (g->first = 0; !bad && g->first < g->channels; g->first += LANES) {
+		if (g->first) {
 			memset(at, 0, H_PARTS * n * sizeof *at);
 			memset(g->variance[0], 0, 2 * n * sizeof **g->variance);
 		}
 		set_unit(g);
 		set_feeds(g);
 		par_for(g->ranges, 1, threads, add_range, g, NULL);
-		par_for(g->s->element_sides, 4096, threads, put_bands, g, NULL);
+		par_for(g->s->element_sides, 4096, threads, put_channels, g, NULL);
 		g->bytes += bytes_of(g);
 	}
 	free(room);
@@ -354,17 +365,17 @@ static int block_fluxes(const struct transport *t, const struct solution *s, dou
                         struct err *e)
 {
 	struct sender sender;
-	size_t bands = (size_t)s->bands;
-	int bad = sender_init(&sender, t, e);
+	size_t channels = solution_channels(s);
+	int bad = sender_init(&sender, t, s->groups, e);
 
 	for (uint32_t r = 0; !bad && r < t->rows; r++)
 		for (int fresh = 0; fresh < 2; fresh++) {
-			double *to = flux[fresh] + t->row_block[r] * bands;
-			send_block_flux(&sender, r, s->shot + (2 * (size_t)r + (size_t)fresh) * bands, to);
+			double *to = flux[fresh] + t->row_block[r] * channels;
+			send_block_flux(&sender, r, s->shot + (2 * (size_t)r + (size_t)fresh) * channels,
+			                to);
 			for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
-				for (size_t k = 0; k < bands; k++)
-					flux[fresh][b * bands + k] /=
-						t->block[b].sum > 0 ? t->block[b].sum : 1;
+				for (size_t c = 0; c < channels; c++)
+					*to++ /= t->block[b].sum > 0 ? t->block[b].sum : 1;
 		}
 	sender_free(&sender);
 	return bad;
@@ -390,14 +401,15 @@ int radiosity_gather(struct solution *s, const struct transport *t, int threads,
 {
 	double *flux[2];
 	struct gather g = { .t = t, .s = s, .to_patches = t->shard[0]->to_patches,
+	                    .channels = solution_channels(s),
 	                    .ranges = threads > 1 ? (size_t)threads : 1 };
 
 	g.receivers = g.to_patches ? t->m->patches : t->m->elements;
 	for (int i = 0; i < 2; i++)
-		g.block_flux[i] = flux[i] = mem_new(t->blocks, (size_t)s->bands * sizeof(double),
+		g.block_flux[i] = flux[i] = mem_new(t->blocks, g.channels * sizeof(double),
 		                                    "flux by chain", e);
 	int bad = !flux[0] || !flux[1] || block_fluxes(t, s, flux, e) ||
-	          cut_ranges(&g, e) || gather_bands(&g, threads, e);
+	          cut_ranges(&g, e) || gather_channels(&g, threads, e);
 	r->gather_bytes = g.bytes;
 	free(g.cut);
 	free(flux[0]);

@@ -1,4 +1,4 @@
-/* Bands in vectors of four doubles. */
+/* Channels (bands, of each light group) in vectors of four doubles. */
 #ifndef TWOPASS_LANES_H
 #define TWOPASS_LANES_H
 
@@ -7,7 +7,7 @@
 
 #include "mem.h"
 
-enum { LANES = 4 };
+enum { LANES = 4, CHANNELS_MAX = 384, VECTORS_MAX = CHANNELS_MAX / LANES };
 
 /* For loops that are to be made anew for each set of constants. */
 #define ALWAYS_INLINE inline __attribute__((always_inline))
@@ -15,10 +15,10 @@ enum { LANES = 4 };
 typedef double lanes __attribute__((vector_size(32)));
 typedef float lanes_f32 __attribute__((vector_size(16)));
 
-/* Vectors that hold so many bands. */
-static inline size_t lanes_groups(int bands)
+/* Vectors that hold so many channels. */
+static inline size_t lanes_vectors(size_t channels)
 {
-	return ((size_t)bands + LANES - 1) / LANES;
+	return (channels + LANES - 1) / LANES;
 }
 
 /* n zeroed vectors, aligned as such; *room is what to free. NULL and e when out of
@@ -29,21 +29,21 @@ static inline lanes *lanes_new(size_t n, void **room, const char *what, struct e
 	return *room ? (lanes *)(((uintptr_t)*room + 31) & ~(uintptr_t)31) : NULL;
 }
 
-/* Rows of `bands` doubles to rows of vectors, padded with what is there (0), and back. */
-static inline void lanes_pack(lanes *to, const double *from, size_t rows, int bands)
+/* Rows of n doubles to rows of vectors, padded with what is there (0), and back. */
+static inline void lanes_pack(lanes *to, const double *from, size_t rows, size_t n)
 {
-	size_t groups = lanes_groups(bands), n = (size_t)bands;
+	size_t vectors = lanes_vectors(n);
 
 	for (size_t i = 0; i < rows; i++)
-		memcpy(to + i * groups, from + i * n, n * sizeof *from);
+		memcpy(to + i * vectors, from + i * n, n * sizeof *from);
 }
 
-static inline void lanes_unpack(double *to, const lanes *from, size_t rows, int bands)
+static inline void lanes_unpack(double *to, const lanes *from, size_t rows, size_t n)
 {
-	size_t groups = lanes_groups(bands), n = (size_t)bands;
+	size_t vectors = lanes_vectors(n);
 
 	for (size_t i = 0; i < rows; i++)
-		memcpy(to + i * n, from + i * groups, n * sizeof *to);
+		memcpy(to + i * n, from + i * vectors, n * sizeof *to);
 }
 
 static inline double lanes_total(const lanes *x, size_t n)
@@ -52,6 +52,23 @@ static inline double lanes_total(const lanes *x, size_t n)
 
 	for (size_t i = 0; i < n; i++)
 		sum += x[i];
+	return sum[0] + sum[1] + sum[2] + sum[3];
+}
+
+static inline lanes lanes_abs(lanes x)
+{
+	typedef long long bits __attribute__((vector_size(32)));
+
+	return (lanes)((bits)x & INT64_MAX);
+}
+
+/* Sum of the absolute values of n vectors. */
+static inline double lanes_magnitude(const lanes *x, size_t n)
+{
+	lanes sum = { 0 };
+
+	for (size_t i = 0; i < n; i++)
+		sum += lanes_abs(x[i]);
 	return sum[0] + sum[1] + sum[2] + sum[3];
 }
 

@@ -5,13 +5,15 @@
  * light that arrived on it (the paper's arrays of unshot radiosity, kept only for
  * sources that a directional patch really sees: the links of a .ff file). Shots go
  * in rounds: a round shoots every patch-side, in index order, that holds at least
- * half of the largest relative unshot flux at its beginning.
+ * half of the largest relative unshot flux at its beginning. Flux of all bands and light
+ * groups goes in one shot.
  *
  * Shots work on flux summed by patch; elements get their irradiance at the end, in
  * one pass over the form factors with the total that each row has sent. */
 #ifndef TWOPASS_RADIOSITY_H
 #define TWOPASS_RADIOSITY_H
 
+#include "components.h"
 #include "par.h"
 #include "solution.h"
 #include "transport.h"
@@ -37,6 +39,7 @@ struct radiosity_hooks {
 
 struct radiosity_report {
 	uint64_t rounds;
+	double passes;         /* how many times all form factors would be read by what was */
 	int components;        /* connected parts that have an emitter */
 	double unshot;         /* unshot / emitted, the worst component and band */
 	double residual;       /* largest ledger residual of any shot or round */
@@ -47,13 +50,15 @@ struct radiosity_report {
 	double gather_bytes;   /* and by the pass over elements: columns and values */
 };
 
-/* Zeroed state for a model and its transport with all emission unshot.
- * 0, or -1 and e ("no emitter" if nothing emits). */
+/* Zeroed state for a model and its transport with all emission unshot; light_groups: see
+ * light_groups_set. 0, or -1 and e ("no emitter" if nothing emits). */
 int solution_begin(struct solution *s, const struct model *m, const struct transport *t,
-                   struct err *e);
+                   int light_groups, struct err *e);
 
-/* Shoots until `stop` or max_shots. "no steady state" if light reaches a closed
- * part that absorbs nothing. O(shots x runs of a row). 0, or -1 and e. */
+/* Shoots until `stop` or max_shots. Where the rest would take many more sweeps over all
+ * sides, it is solved for and shot at once (overshoot.c), which may leave unshot flux of
+ * both signs. "no steady state" if light reaches a closed part that absorbs nothing.
+ * O(shots x runs of a row). 0, or -1 and e. */
 int radiosity_shoot(struct solution *s, const struct transport *t,
                     const struct radiosity_options *o, const struct radiosity_hooks *hooks,
                     struct radiosity_report *r, struct err *e);
@@ -63,9 +68,10 @@ int radiosity_shoot(struct solution *s, const struct transport *t,
 int radiosity_gather(struct solution *s, const struct transport *t, int threads,
                      struct radiosity_report *r, struct err *e);
 
-/* An upper bound, per unit of unshot flux, of the flux that will still arrive
- * anywhere; INFINITY if it cannot be bounded. Adds to *bytes what it reads of runs.
+/* An upper bound of the flux that will still arrive anywhere because of what is unshot;
+ * INFINITY if it cannot be bounded. Adds to *bytes what it reads of runs.
  * O(runs x steps), at most 64 steps. */
-double radiosity_tail_bound(const struct transport *t, int threads, double *bytes);
+double radiosity_tail_bound(const struct transport *t, const struct components *parts,
+                            const struct solution *s, int threads, double *bytes);
 
 #endif

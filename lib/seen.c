@@ -8,15 +8,6 @@
 #include "contour.h"
 #include "vec3.h"
 
-/* A convex piece gains a corner at most from each plane that cuts it: those of a facet and
- * of a blocker's silhouette. */
-enum { PIECE_CORNERS = 80 };
-
-struct facet_piece {
-	int n;
-	double v[PIECE_CORNERS][3];
-};
-
 void seer_free(struct seer *s)
 {
 	free(s->piece.data);
@@ -188,6 +179,12 @@ static int hide(struct seer *o, int blocker, const double x[3], struct err *e)
 	o->piece = o->next;
 	o->next = swap;
 	return 0;
+}
+
+const struct facet_piece *seen_pieces(const struct seer *o, size_t *n)
+{
+	*n = o->piece.n;
+	return o->piece.data;
 }
 
 double seen(struct seer *o, const double x[3], const double normal[3], const struct facet *g,

@@ -5,6 +5,15 @@
 #include "mem.h"
 #include "sight.h"
 
+/* A convex piece gains a corner at most from each plane that cuts it: those of a facet and
+ * of a blocker's silhouette. */
+enum { PIECE_CORNERS = 80 };
+
+struct facet_piece {
+	int n;
+	double v[PIECE_CORNERS][3];
+};
+
 /* One thread's scratch space and the blockers; begin with {0}, release with seer_free. */
 struct seer {
 	struct blocker blocker[SIGHT_BLOCKERS];
@@ -21,5 +30,8 @@ void seer_free(struct seer *s);
  * memory is short. */
 double seen(struct seer *s, const double x[3], const double normal[3], const struct facet *g,
             uint64_t blockers, struct err *e);
+
+/* The n convex pieces that the last call found visible; valid until the next. */
+const struct facet_piece *seen_pieces(const struct seer *s, size_t *n);
 
 #endif

@@ -10,21 +10,22 @@
 static void fill_parts(struct sender *s)
 {
 	const struct materials *mt = &s->m->material;
-	size_t width = LANES * s->groups;
+	size_t width = LANES * s->vectors;
 
 	for (uint32_t i = 0; i < 2 * mt->n; i++) {
 		uint32_t material = i >> 1;
 		int side = (int)(i & 1);
 		size_t at = material_at(mt, material, side);
-		double *part = (double *)(s->part + i * PARTS * s->groups);
+		double *part = (double *)(s->part + i * PARTS * s->vectors);
 		int lobe_r = bsdf_has_lobe(mt, material, side, 0);
 		int lobe_t = bsdf_has_lobe(mt, material, side, 1);
-		for (size_t k = 0; k < (size_t)s->bands; k++) {
-			part[PART_RHO * width + k] = mt->rho_d[at + k];
-			part[PART_TAU * width + k] = mt->tau_d[at + k];
-			part[PART_LOBES * width + k] = (lobe_r ? mt->rho_s[at + k] : 0) +
+		for (size_t c = 0; c < s->channels; c++) {
+			size_t k = c % (size_t)s->bands;
+			part[PART_RHO * width + c] = mt->rho_d[at + k];
+			part[PART_TAU * width + c] = mt->tau_d[at + k];
+			part[PART_LOBES * width + c] = (lobe_r ? mt->rho_s[at + k] : 0) +
 			                               (lobe_t ? mt->tau_s[at + k] : 0);
-			part[PART_ABSORBED * width + k] =
+			part[PART_ABSORBED * width + c] =
 				1 - bsdf_albedo(mt, material, side, (int)k);
 		}
 	}
@@ -32,14 +33,40 @@ static void fill_parts(struct sender *s)
 		s->surface[ps] = 2 * model_patch_material(s->m, ps >> 1) + (ps & 1);
 }
 
-int sender_init(struct sender *s, const struct transport *t, struct err *e)
+int sent_new(struct sent *x, size_t vectors, struct err *e)
+{
+	lanes *at = lanes_new(6 * vectors, &x->room, "flux", e);
+
+	x->vectors = vectors;
+	x->absorbed = at;
+	x->escaped = at + vectors;
+	x->lost = at + 2 * vectors;
+	x->cut = at + 3 * vectors;
+	x->kept = at + 4 * vectors;
+	x->guessed = at + 5 * vectors;
+	return at ? 0 : -1;
+}
+
+void sent_clear(struct sent *x)
+{
+	memset(x->absorbed, 0, 6 * x->vectors * sizeof(lanes));
+}
+
+void sent_free(struct sent *x)
+{
+	free(x->room);
+	*x = (struct sent){ 0 };
+}
+
+int sender_init(struct sender *s, const struct transport *t, size_t groups, struct err *e)
 {
 	*s = (struct sender){ .t = t, .m = t->m, .bands = t->m->bands };
-	s->groups = lanes_groups(s->bands);
-	s->chain_flux = mem_new(t->chains.n, (size_t)s->bands * sizeof(double), "chain flux", e);
+	s->channels = groups * (size_t)s->bands;
+	s->vectors = lanes_vectors(s->channels);
+	s->chain_flux = mem_new(t->chains.n, s->channels * sizeof(double), "chain flux", e);
 	s->touched = mem_new(t->chains.n, sizeof *s->touched, "chain flux", e);
 	s->is_touched = mem_new(t->chains.n, 1, "chain flux", e);
-	s->part = lanes_new(2 * t->m->material.n * PARTS * s->groups, &s->room[0], "albedos", e);
+	s->part = lanes_new(2 * t->m->material.n * PARTS * s->vectors, &s->room[0], "albedos", e);
 	s->surface = mem_new(2 * t->m->patches, sizeof *s->surface, "albedos", e);
 	if (!s->chain_flux || !s->touched || !s->is_touched || !s->part || !s->surface)
 		return -1;
@@ -63,32 +90,32 @@ int sender_load(struct sender *s, const struct solution *sol, struct err *e)
 {
 	size_t sides = 2 * s->m->patches, links = 2 * s->t->links;
 
-	s->unshot_diffuse = lanes_new(sides * s->groups, &s->room[1], "unshot flux", e);
-	s->unshot_link = lanes_new(links * s->groups, &s->room[2], "unshot flux", e);
+	s->unshot_diffuse = lanes_new(sides * s->vectors, &s->room[1], "unshot flux", e);
+	s->unshot_link = lanes_new(links * s->vectors, &s->room[2], "unshot flux", e);
 	s->link_gain = mem_new(sides, sizeof *s->link_gain, "unshot flux", e);
 	if (!s->unshot_diffuse || !s->unshot_link || !s->link_gain)
 		return -1;
-	lanes_pack(s->unshot_diffuse, sol->unshot_diffuse, sides, s->bands);
-	lanes_pack(s->unshot_link, sol->unshot_link, links, s->bands);
+	lanes_pack(s->unshot_diffuse, sol->unshot_diffuse, sides, s->channels);
+	lanes_pack(s->unshot_link, sol->unshot_link, links, s->channels);
 	return 0;
 }
 
 void sender_store(const struct sender *s, struct solution *sol)
 {
-	lanes_unpack(sol->unshot_diffuse, s->unshot_diffuse, 2 * s->m->patches, s->bands);
-	lanes_unpack(sol->unshot_link, s->unshot_link, 2 * s->t->links, s->bands);
+	lanes_unpack(sol->unshot_diffuse, s->unshot_diffuse, 2 * s->m->patches, s->channels);
+	lanes_unpack(sol->unshot_link, s->unshot_link, 2 * s->t->links, s->channels);
 }
 
 static void into_chain(struct sender *s, uint32_t chain, const double *x, const double *part)
 {
-	double *flux = s->chain_flux + (size_t)chain * (size_t)s->bands;
+	double *flux = s->chain_flux + chain * s->channels;
 
 	if (!s->is_touched[chain]) {
 		s->is_touched[chain] = 1;
 		s->touched[s->touches++] = chain;
 	}
-	for (int k = 0; k < s->bands; k++)
-		flux[k] += x[k] * part[k];
+	for (size_t c = 0; c < s->channels; c++)
+		flux[c] += x[c] * part[c % (size_t)s->bands];
 }
 
 /* Flux x of chain c on ideal patch-side: what goes on by R and by T. Chains that no
@@ -116,33 +143,29 @@ static void go_on(struct sender *s, uint32_t chain, uint32_t material, int side,
 /* Takes the flux that waits for a chain. */
 static void take(struct sender *s, uint32_t chain, double *x)
 {
-	double *flux = s->chain_flux + (size_t)chain * (size_t)s->bands;
+	double *flux = s->chain_flux + chain * s->channels;
 
-	for (int k = 0; k < s->bands; k++) {
-		x[k] = flux[k];
-		flux[k] = 0;
-	}
+	memcpy(x, flux, s->channels * sizeof *x);
+	memset(flux, 0, s->channels * sizeof *flux);
 }
 
 static void finish(struct sender *s, lanes *cut)
 {
-	double x[BANDS_MAX];
+	double x[CHANNELS_MAX];
 
 	for (size_t i = 0; i < s->touches; i++) {
 		take(s, s->touched[i], x);
-		for (int k = 0; cut && k < s->bands; k++)
-			((double *)cut)[k] += x[k];
+		for (size_t c = 0; cut && c < s->channels; c++)
+			((double *)cut)[c] += x[c];
 		s->is_touched[s->touched[i]] = 0;
 	}
 	s->touches = 0;
 }
 
-/* Flux landing from a block: four bands of it, x by unit of the values. The loops over
- * runs are made twice, inlined with `groups` known to be 1 and not. */
+/* Flux landing from a block: four channels of it, x by unit of the values. */
 struct landing {
 	const struct sender *s;
 	const struct block *block;
-	size_t group, groups;
 	int freshness;
 	lanes x;
 };
@@ -156,39 +179,39 @@ static ALWAYS_INLINE void land_plain(const struct landing l, uint64_t run, lanes
                                      lanes *absorbed)
 {
 	uint32_t target = l.s->t->run_target[run];
-	const lanes *part = l.s->part + l.s->surface[target] * PARTS * l.groups + l.group;
-	lanes x = l.x * l.s->t->run_sum[run], same = part[PART_RHO * l.groups] * x;
+	const lanes *part = l.s->part + l.s->surface[target] * PARTS;
+	lanes x = l.x * l.s->t->run_sum[run], same = part[PART_RHO] * x;
 
-	l.s->unshot_diffuse[target * l.groups + l.group] += same;
+	l.s->unshot_diffuse[target] += same;
 	*kept += same;
-	*absorbed += part[PART_ABSORBED * l.groups] * x;
+	*absorbed += part[PART_ABSORBED] * x;
 }
 
 static ALWAYS_INLINE void land_special(const struct landing l, uint64_t run, uint32_t link,
                                        struct landed *sum)
 {
 	uint32_t target = l.s->t->run_target[run];
-	const lanes *part = l.s->part + l.s->surface[target] * PARTS * l.groups + l.group;
-	lanes x = l.x * l.s->t->run_sum[run], same = part[PART_RHO * l.groups] * x;
-	lanes other = part[PART_TAU * l.groups] * x, lobes = part[PART_LOBES * l.groups] * x;
+	const lanes *part = l.s->part + l.s->surface[target] * PARTS;
+	lanes x = l.x * l.s->t->run_sum[run], same = part[PART_RHO] * x;
+	lanes other = part[PART_TAU] * x, lobes = part[PART_LOBES] * x;
 
-	l.s->unshot_diffuse[target * l.groups + l.group] += same;
-	l.s->unshot_diffuse[(target ^ 1) * l.groups + l.group] += other;
+	l.s->unshot_diffuse[target] += same;
+	l.s->unshot_diffuse[target ^ 1] += other;
 	sum->kept[0] += same + other;
-	sum->absorbed[0] += part[PART_ABSORBED * l.groups] * x;
+	sum->absorbed[0] += part[PART_ABSORBED] * x;
 	if (link == FF_NO_ROW) {
 		sum->cut += lobes;
 		return;
 	}
-	size_t at = 2 * (size_t)(link & ~RUN_GUESSED) + (size_t)l.freshness;
-	l.s->unshot_link[at * l.groups + l.group] += lobes;
+	l.s->unshot_link[2 * (size_t)(link & ~RUN_GUESSED) + (size_t)l.freshness] += lobes;
 	l.s->link_gain[target] += lanes_total(&lobes, 1);
 	sum->kept[1] += lobes;
 	if (link & RUN_GUESSED)
 		sum->guessed += lobes;
 }
 
-static ALWAYS_INLINE struct landed land(const struct landing l)
+/* Where channels fit one vector. */
+static void land_one(const struct landing l, struct sent *sent)
 {
 	const uint32_t *link = l.s->t->run_link + l.block->link;
 	uint64_t i = l.block->run, special = l.block->special, end = l.block[1].run;
@@ -202,39 +225,90 @@ static ALWAYS_INLINE struct landed land(const struct landing l)
 		land_plain(l, i, &sum.kept[0], &sum.absorbed[0]);
 	for (i = special; i < end; i++)
 		land_special(l, i, *link++, &sum);
-	return sum;
+	sent->kept[0] += sum.kept[0] + sum.kept[1];
+	sent->absorbed[0] += sum.absorbed[0] + sum.absorbed[1];
+	sent->cut[0] += sum.cut;
+	sent->guessed[0] += sum.guessed;
+}
+
+/* What comes to the lobes of a special side by a run. */
+static void land_lobes(struct sender *s, uint32_t target, uint32_t link, int freshness,
+                       const lanes *x, struct sent *sent)
+{
+	const size_t n = s->vectors;
+	const lanes *part = s->part + (s->surface[target] * PARTS + PART_LOBES) * n;
+	lanes *to = s->unshot_link +
+	            (2 * (size_t)(link & ~RUN_GUESSED) + (size_t)freshness) * n;
+
+	for (size_t v = 0; v < n; v++) {
+		lanes lobes = part[v] * x[v];
+		if (link == FF_NO_ROW) {
+			sent->cut[v] += lobes;
+			continue;
+		}
+		to[v] += lobes;
+		s->link_gain[target] += lanes_total(&lobes, 1);
+		sent->kept[v] += lobes;
+		if (link & RUN_GUESSED)
+			sent->guessed[v] += lobes;
+	}
+}
+
+/* Where they do not: each run is read once for all. */
+static void land_many(struct sender *s, const struct block *block, int freshness,
+                      const lanes *in, struct sent *sent)
+{
+	const size_t n = s->vectors;
+	lanes x[VECTORS_MAX];
+
+	for (uint64_t i = block->run; i < block[1].run; i++) {
+		uint32_t target = s->t->run_target[i];
+		const lanes *part = s->part + s->surface[target] * PARTS * n;
+		lanes *here = s->unshot_diffuse + target * n;
+		lanes *there = s->unshot_diffuse + (target ^ 1) * n;
+		for (size_t v = 0; v < n; v++) {
+			x[v] = in[v] * s->t->run_sum[i];
+			lanes same = part[PART_RHO * n + v] * x[v];
+			here[v] += same;
+			sent->kept[v] += same;
+			sent->absorbed[v] += part[PART_ABSORBED * n + v] * x[v];
+		}
+		if (i < block->special)
+			continue;
+		for (size_t v = 0; v < n; v++) {
+			there[v] += part[PART_TAU * n + v] * x[v];
+			sent->kept[v] += part[PART_TAU * n + v] * x[v];
+		}
+		land_lobes(s, target, s->t->run_link[block->link + (i - block->special)],
+		           freshness, x, sent);
+	}
 }
 
 static void send_block(struct sender *s, const struct block *block, int freshness,
                        const lanes *in, struct sent *sent)
 {
 	const struct transport *t = s->t;
+	uint64_t runs = block[1].run - block->run;
 
-	for (size_t g = 0; g < s->groups; g++) {
-		struct landed sum = s->groups == 1
-			? land((struct landing){ s, block, 0, 1, freshness, in[0] })
-			: land((struct landing){ s, block, g, s->groups, freshness, in[g] });
-		sent->kept[g] += sum.kept[0] + sum.kept[1];
-		sent->absorbed[g] += sum.absorbed[0] + sum.absorbed[1];
-		sent->cut[g] += sum.cut;
-		sent->guessed[g] += sum.guessed;
-	}
-	s->bytes += (double)s->groups *
-	            ((double)(block[1].run - block->run) *
-	                 (sizeof *t->run_target + sizeof *t->run_sum) +
-	             (double)(block[1].run - block->special) * sizeof *t->run_link);
+	if (s->vectors == 1)
+		land_one((struct landing){ s, block, freshness, in[0] }, sent);
+	else
+		land_many(s, block, freshness, in, sent);
+	s->runs += runs;
+	s->bytes += (double)runs * (sizeof *t->run_target + sizeof *t->run_sum) +
+	            (double)(block[1].run - block->special) * sizeof *t->run_link;
 }
 
 /* What goes on from a block's ideal runs when x is its flux by unit of the values. */
 static void send_on(struct sender *s, const struct block *block, const double *x)
 {
 	const struct transport *t = s->t;
-	double landed[BANDS_MAX];
+	double landed[CHANNELS_MAX];
 
 	for (uint64_t i = block->ideal; i < block[1].run; i++) {
 		uint32_t surface = s->surface[t->run_target[i]];
-		for (int k = 0; k < s->bands; k++)
-			landed[k] = x[k] * t->run_sum[i];
+		for (size_t c = 0; c < s->channels; c++)
+			landed[c] = x[c] * t->run_sum[i];
 		go_on(s, block->chain, surface >> 1, (int)(surface & 1), landed);
 	}
 }
@@ -271,13 +345,14 @@ static void go_round(struct sender *s, const struct block *block, double *in, la
 	if (block->chain == 0 || !(block->sum > 0))
 		return;
 	loop_gain(s, block, gain);
-	for (int k = 0; k < s->bands; k++) {
-		if (gain[k] < 1 - 1e-9) {
-			in[k] /= 1 - gain[k];
+	for (size_t c = 0; c < s->channels; c++) {
+		double g = gain[c % (size_t)s->bands];
+		if (g < 1 - 1e-9) {
+			in[c] /= 1 - g;
 		} else {
 			if (cut)
-				((double *)cut)[k] += in[k];
-			in[k] = 0;
+				((double *)cut)[c] += in[c];
+			in[c] = 0;
 		}
 	}
 }
@@ -286,27 +361,26 @@ void send_row(struct sender *s, uint32_t row, int freshness, const lanes *flux,
               struct sent *sent)
 {
 	const struct transport *t = s->t;
+	const size_t n = s->vectors;
+	lanes in[VECTORS_MAX];
 
 	for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
 		const struct block *block = &t->block[b];
-		lanes in[GROUPS_MAX];
-		double any = 0;
-		memset(in, 0, s->groups * sizeof *in);
-		if (block->chain)
+		if (block->chain) {
+			in[n - 1] = (lanes){ 0 };
 			take(s, block->chain, (double *)in);
-		else
-			memcpy(in, flux, s->groups * sizeof *in);
-		for (size_t g = 0; g < s->groups; g++)
-			any += in[g][0] + in[g][1] + in[g][2] + in[g][3];
-		if (!(any > 0))
+		} else {
+			memcpy(in, flux, n * sizeof *in);
+		}
+		if (!(lanes_magnitude(in, n) > 0))
 			continue;
 		go_round(s, block, (double *)in, sent->cut);
-		for (size_t g = 0; g < s->groups; g++) {
-			in[g] /= block->sum > 0 ? block->sum : 1;
-			sent->escaped[g] += in[g] * block->escape;
-			sent->absorbed[g] += in[g] * block->black;
-			sent->lost[g] += in[g] * block->lost;
-			sent->cut[g] += in[g] * block->cut;
+		for (size_t v = 0; v < n; v++) {
+			in[v] /= block->sum > 0 ? block->sum : 1;
+			sent->escaped[v] += in[v] * block->escape;
+			sent->absorbed[v] += in[v] * block->black;
+			sent->lost[v] += in[v] * block->lost;
+			sent->cut[v] += in[v] * block->cut;
 		}
 		send_block(s, block, freshness, in, sent);
 		send_on(s, block, (double *)in);
@@ -317,18 +391,18 @@ void send_row(struct sender *s, uint32_t row, int freshness, const lanes *flux,
 void send_block_flux(struct sender *s, uint32_t row, const double *flux, double *block_flux)
 {
 	const struct transport *t = s->t;
-	double x[BANDS_MAX];
+	double x[CHANNELS_MAX];
 
 	for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
 		const struct block *block = &t->block[b];
-		double *in = block_flux + (b - t->row_block[row]) * (size_t)s->bands;
+		double *in = block_flux + (b - t->row_block[row]) * s->channels;
 		if (block->chain)
 			take(s, block->chain, in);
 		else
-			memcpy(in, flux, (size_t)s->bands * sizeof *in);
+			memcpy(in, flux, s->channels * sizeof *in);
 		go_round(s, block, in, NULL);
-		for (int k = 0; k < s->bands; k++)
-			x[k] = block->sum > 0 ? in[k] / block->sum : 0;
+		for (size_t c = 0; c < s->channels; c++)
+			x[c] = block->sum > 0 ? in[c] / block->sum : 0;
 		send_on(s, block, x);
 	}
 	finish(s, NULL);

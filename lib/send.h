@@ -14,35 +14,41 @@ struct sender {
 	const struct transport *t;
 	const struct model *m;
 	int bands;
-	size_t groups;           /* vectors for the bands */
+	size_t channels;         /* light groups x bands */
+	size_t vectors;          /* that hold them */
+	uint64_t runs;           /* read by send_row */
 	uint32_t *surface;       /* [2P] material and side, an index of part */
-	lanes *part;             /* [2 materials][PARTS][groups] of flux arriving */
-	lanes *unshot_diffuse;   /* [2P][groups] as in solution.h, see sender_load */
-	lanes *unshot_link;      /* [links][2][groups] */
-	double *link_gain;       /* [2P] flux that came to the links of a side, to rounding,
-	                            since the owner set it to 0 */
+	lanes *part;             /* [2 materials][PARTS][vectors] of flux arriving */
+	lanes *unshot_diffuse;   /* [2P][vectors] as in solution.h, see sender_load */
+	lanes *unshot_link;      /* [links][2][vectors] */
+	double *link_gain;       /* [2P] flux that came to the links of a side, in all channels,
+	                            to rounding, since the owner set it to 0 */
 	void *room[3];           /* memory of these */
-	double *chain_flux;      /* [chains][bands], 0 between rows */
+	double *chain_flux;      /* [chains][channels], 0 between rows */
 	uint32_t *touched;       /* chains with flux */
 	uint8_t *is_touched;
 	size_t touches;
-	double bytes;            /* of runs read by send_row */
+	double bytes;            /* of runs read by it */
 };
 
 /* What becomes of flux arriving: reflected and transmitted diffusely, by all finite
  * lobes, absorbed. */
 enum { PART_RHO, PART_TAU, PART_LOBES, PART_ABSORBED, PARTS };
 
-enum { GROUPS_MAX = BANDS_MAX / LANES };
-
-/* What became of a row's flux, by group of bands. */
+/* What became of the flux of rows: [vectors] each, one behind the other. Kept is what
+ * became unshot flux again. */
 struct sent {
-	lanes absorbed[GROUPS_MAX], escaped[GROUPS_MAX], lost[GROUPS_MAX], cut[GROUPS_MAX];
-	lanes kept[GROUPS_MAX];  /* became unshot flux again */
-	lanes guessed[GROUPS_MAX];
+	lanes *absorbed, *escaped, *lost, *cut, *kept, *guessed;
+	size_t vectors;
+	void *room;
 };
 
-int sender_init(struct sender *s, const struct transport *t, struct err *e);
+int sent_new(struct sent *x, size_t vectors, struct err *e);
+void sent_clear(struct sent *x);
+void sent_free(struct sent *x);
+
+/* For flux of all bands of so many light groups. 0, or -1 and e. */
+int sender_init(struct sender *s, const struct transport *t, size_t groups, struct err *e);
 void sender_free(struct sender *s);
 
 /* The unshot flux of a solution into the sender, whose own send_row adds to, and back.
@@ -50,12 +56,13 @@ void sender_free(struct sender *s);
 int sender_load(struct sender *s, const struct solution *sol, struct err *e);
 void sender_store(const struct sender *s, struct solution *sol);
 
-/* Sends flux by a row into the sender's unshot flux; adds to `sent`. */
+/* Sends flux, which may be negative, by a row into the sender's unshot flux; adds to
+ * `sent`. */
 void send_row(struct sender *s, uint32_t row, int freshness, const lanes *flux,
               struct sent *sent);
 
-/* The flux that comes in by each block of a row, [blocks of the row][bands], when
- * the row sends flux[bands]. */
+/* The flux that comes in by each block of a row, [blocks of the row][channels],
+ * when the row sends flux[channels]. */
 void send_block_flux(struct sender *s, uint32_t row, const double *flux, double *block_flux);
 
 #endif

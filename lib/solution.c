@@ -3,6 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "lanes.h"
+
 double solution_exitance(const struct model *m, const struct solution *s,
                          size_t element_side, int band)
 {
@@ -32,10 +34,18 @@ static int check_numbers(const char *name, const double *v, size_t n, int signs,
 int solution_check(const struct model *m, const struct solution *s, struct err *e)
 {
 	size_t bands = (size_t)s->bands, sides = s->element_sides * bands;
+	size_t channels = solution_channels(s);
 
 	if (s->bands != m->bands || s->element_sides != 2 * m->elements ||
 	    s->patch_sides != 2 * m->patches || s->groups < 1)
 		return err_set(e, "array irradiance_direct: it is not that of the model's elements");
+	if (s->groups > CHANNELS_MAX / bands)
+		return err_set(e, "array irradiance_direct: more than %zu light groups",
+		               CHANNELS_MAX / bands);
+	for (size_t i = 0; i < s->emitters; i++)
+		if (s->emitter_group[i] >= s->groups)
+			return err_set(e, "array emitter_group: value %zu is %u", i,
+			               s->emitter_group[i]);
 	return check_numbers("irradiance_direct", s->direct, s->groups * sides, 0, e) ||
 	       check_numbers("irradiance_caustic", s->caustic, s->groups * sides, 0, e) ||
 	       check_numbers("irradiance_indirect", s->indirect, s->groups * sides, 0, e) ||
@@ -44,12 +54,12 @@ int solution_check(const struct model *m, const struct solution *s, struct err *
 	       check_numbers("irradiance_discretisation", s->discretisation, sides, 0, e) ||
 	       check_numbers("unshot_emission", s->unshot_emission, s->patch_sides * bands, 1,
 	                     e) ||
-	       check_numbers("unshot_diffuse", s->unshot_diffuse, s->patch_sides * bands, 1,
+	       check_numbers("unshot_diffuse", s->unshot_diffuse, s->patch_sides * channels, 1,
 	                     e) ||
-	       check_numbers("unshot_link", s->unshot_link, 2 * s->links * bands, 1, e) ||
-	       check_numbers("shot", s->shot, 2 * s->rows * bands, 0, e) ||
-	       check_numbers("round", s->round, 2, 0, e) ||
-	       check_numbers("ledger", s->ledger, LEDGER_TERMS * bands, 1, e) ? -1 : 0;
+	       check_numbers("unshot_link", s->unshot_link, 2 * s->links * channels, 1, e) ||
+	       check_numbers("shot", s->shot, 2 * s->rows * channels, 0, e) ||
+	       check_numbers("round", s->round, ROUND_TERMS, 0, e) ||
+	       check_numbers("ledger", s->ledger, LEDGER_TERMS * channels, 1, e) ? -1 : 0;
 }
 
 double solution_mean_error(const struct model *m, const struct solution *s)
@@ -92,5 +102,9 @@ void solution_free(struct solution *s)
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
+	for (size_t g = 0; s->group_name && g < s->groups; g++)
+		free(s->group_name[g]);
+	free(s->group_name);
+	free(s->emitter_group);
 	*s = (struct solution){ 0 };
 }

@@ -7,9 +7,18 @@
 
 #include "model.h"
 
-/* Index i of element-side s, band b, group g: ((g 2E + s) bands + b). */
+/* The priority that the current round of shots asks for, and the next patch-side in it;
+ * how many shots had been taken when the rate of convergence was last looked at, and what
+ * was unshot then. */
+enum { ROUND_LEAST, ROUND_NEXT, ROUND_SHOTS, ROUND_UNSHOT, ROUND_TERMS };
+
+/* Index of element-side s, band b, group g: ((g 2E + s) bands + b). The solver keeps
+ * groups and bands together, as channels: g bands + b. */
 struct solution {
-	size_t groups;             /* light groups, 1 */
+	size_t groups;             /* light groups */
+	char **group_name;         /* [groups] */
+	size_t emitters;           /* materials */
+	uint32_t *emitter_group;   /* [emitters] group of what it emits, 0 if nothing */
 	size_t element_sides;      /* 2 E */
 	int bands;
 	double *direct;            /* irradiance straight from emitters */
@@ -27,26 +36,34 @@ struct solution {
 	size_t links;              /* of all shards, in the solver's order */
 	size_t rows;               /* of all shards, in order */
 	double *unshot_emission;   /* [2P][bands] flux not yet sent by emitters */
-	double *unshot_diffuse;    /* [2P][bands] flux to leave diffusely */
-	double *unshot_link;       /* [links][2][bands] flux to leave by the lobes of a
+	double *unshot_diffuse;    /* [2P][channels] flux to leave diffusely */
+	double *unshot_link;       /* [links][2][channels] flux to leave by the lobes of a
 	                              link's target: first what has met only emitters,
 	                              directional and ideal events so far, then the rest */
-	double *shot;              /* [rows][2][bands] flux sent, split likewise */
-	double *ledger;            /* [LEDGER_TERMS][bands] flux */
+	double *shot;              /* [rows][2][channels] flux sent, split likewise */
+	double *ledger;            /* [LEDGER_TERMS][channels] flux */
 	uint64_t shots;
-	double round[2];           /* the priority that the current round of shots asks
-	                              for, and the next patch-side in it */
+	double round[ROUND_TERMS];
 };
 
 enum { LEDGER_EMITTED, LEDGER_ABSORBED, LEDGER_ESCAPED, LEDGER_LOST, LEDGER_CUT,
        LEDGER_TERMS };
 
-/* Sum of the three parts, group 0. */
+static inline size_t solution_channels(const struct solution *s)
+{
+	return s->groups * (size_t)s->bands;
+}
+
+/* Sum of the three parts and all groups. */
 static inline double solution_irradiance(const struct solution *s, size_t element_side,
                                          int band)
 {
 	size_t i = element_side * (size_t)s->bands + (size_t)band;
-	return s->direct[i] + s->caustic[i] + s->indirect[i];
+	double h = 0;
+
+	for (size_t g = 0; g < s->groups; g++, i += s->element_sides * (size_t)s->bands)
+		h += s->direct[i] + s->caustic[i] + s->indirect[i];
+	return h;
 }
 
 /* Diffuse exitance without emission of an element-side,

@@ -1,12 +1,13 @@
 /* A certified bound on what unshot flux can still do.
  *
- * q_k(side) = the fraction of flux becoming unshot on a patch-side's arrival that is
- * unshot still after k further shots, for the worst way it can leave. It falls with
- * k, and unit flux is shot at most (q_0 + ... + q_{K-1}) / (1 - q_K) times more, with
- * the largest q over all sides, once q_K < 1, since every K shots repeat the
- * argument. The first step alone gives the familiar 1 / (1 - a), a = the largest
- * albedo. A shot arrives once at its first landing and once more after each ideal
- * surface: the largest number of arrivals a row makes multiplies the bound. */
+ * N(side) = how many times unit flux arriving on a patch-side arrives again, all further
+ * reflections together, for the worst way it can leave. With T the step from one shot to
+ * the next, N = T(1 + N); T is monotone and subadditive (it takes the largest of a side's
+ * lobes). From N_0 = 0, steps add D_k = N_k - N_(k-1), and D_(k+1) <= T D_k. Once
+ * T D_k <= q D_k everywhere in a connected component with q < 1, all that is still to
+ * come is at most q / (1 - q) D_k there. D_k tends to the dominant eigenvector of T, for
+ * which this is sharp (the quotients of Collatz and Wielandt: Varga, Matrix Iterative
+ * Analysis, sec. 2.1). */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,13 +19,18 @@
 
 enum { STEPS = 64 };
 
+/* What is not proved to be smaller than this part of the bound is worth a step more. */
+static const double loose = .05;
+
 struct tail {
 	const struct transport *t;
-	size_t bands, groups;
+	size_t bands, vectors;
+	const struct components *parts;
 	double *in;           /* [blocks][bands] flux by each block of unit flux, over its sum */
-	double *row;          /* [rows][bands] */
-	lanes *q;             /* [2P][groups] */
-	double arrivals;      /* largest of a row */
+	double *row;          /* [rows][bands] what a row makes of D, or of 1 + N */
+	lanes *d;             /* [2P][vectors] D */
+	lanes *n;             /* [2P][vectors] N, later 1 + N */
+	double *ratio;        /* [components] q */
 	double bytes;         /* of runs read */
 };
 
@@ -36,31 +42,34 @@ static void unit_rows(struct tail *x, struct sender *sender)
 	for (size_t k = 0; k < BANDS_MAX; k++)
 		one[k] = 1;
 	for (uint32_t r = 0; r < t->rows; r++) {
-		double *in = x->in + t->row_block[r] * x->bands, arrivals[BANDS_MAX] = { 0 };
+		double *in = x->in + t->row_block[r] * x->bands;
 		send_block_flux(sender, r, one, in);
 		for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
-			for (size_t k = 0; k < x->bands; k++, in++) {
-				arrivals[k] += *in;
-				*in /= t->block[b].sum > 0 ? t->block[b].sum : 1;
-				x->arrivals = fmax(x->arrivals, arrivals[k]);
-			}
+			for (size_t k = 0; k < x->bands; k++)
+				*in++ /= t->block[b].sum > 0 ? t->block[b].sum : 1;
 	}
 }
 
 /* What a block's runs make of unit flux by unit of value, for a vector of bands. */
-static lanes block_step(const struct tail *x, uint64_t b, size_t group)
+static lanes block_step(const struct tail *x, const lanes *of, uint64_t b, size_t v)
 {
 	const struct transport *t = x->t;
 	lanes sum = { 0 };
 
 	for (uint64_t i = t->block[b].run; i < t->block[b + 1].run; i++)
-		sum += t->run_sum[i] * x->q[t->run_target[i] * x->groups + group];
+		sum += t->run_sum[i] * of[t->run_target[i] * x->vectors + v];
 	return sum;
 }
 
+struct rows_job {
+	const struct tail *x;
+	const lanes *of;
+};
+
 static void rows_step(void *arg, size_t begin, size_t end, int thread)
 {
-	const struct tail *x = arg;
+	const struct rows_job *j = arg;
+	const struct tail *x = j->x;
 	const struct transport *t = x->t;
 
 	(void)thread;
@@ -68,96 +77,165 @@ static void rows_step(void *arg, size_t begin, size_t end, int thread)
 		double *row = x->row + r * x->bands;
 		memset(row, 0, x->bands * sizeof *row);
 		for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
-			for (size_t g = 0; g < x->groups; g++) {
-				lanes sum = block_step(x, b, g);
-				for (size_t k = g * LANES; k < x->bands && k < (g + 1) * LANES; k++)
+			for (size_t v = 0; v < x->vectors; v++) {
+				lanes sum = block_step(x, j->of, b, v);
+				for (size_t k = v * LANES; k < x->bands && k < (v + 1) * LANES; k++)
 					row[k] += x->in[b * x->bands + k] * sum[k % LANES];
 			}
 	}
 }
 
-/* Of flux arriving on a side, what is unshot again times what its rows make of it. */
+static void all_rows(struct tail *x, const lanes *of, int threads)
+{
+	struct rows_job j = { x, of };
+
+	par_for(x->t->rows, 64, threads, rows_step, &j, NULL);
+	x->bytes += (double)(x->t->runs * x->vectors) *
+	            (sizeof *x->t->run_target + sizeof *x->t->run_sum);
+}
+
+/* What x->row has of the rows that flux arriving on a side leaves by. */
 static double side_step(const struct tail *x, uint32_t ps, size_t k)
 {
 	const struct transport *t = x->t;
 	const struct materials *mt = &t->m->material;
 	uint32_t material = model_patch_material(t->m, ps >> 1);
 	size_t at = material_at(mt, material, (int)(ps & 1)) + k;
-	double q = 0, lobe[2] = { 0, 0 };
+	double sum = 0, lobe[2] = { 0, 0 };
 
 	if (t->diffuse_row[ps] != FF_NO_ROW)
-		q += mt->rho_d[at] * x->row[t->diffuse_row[ps] * x->bands + k];
+		sum += mt->rho_d[at] * x->row[t->diffuse_row[ps] * x->bands + k];
 	if (t->diffuse_row[ps ^ 1] != FF_NO_ROW)
-		q += mt->tau_d[at] * x->row[t->diffuse_row[ps ^ 1] * x->bands + k];
+		sum += mt->tau_d[at] * x->row[t->diffuse_row[ps ^ 1] * x->bands + k];
 	for (uint64_t l = 2 * t->target_link[ps]; l < 2 * t->target_link[ps + 1]; l++)
 		if (t->link_row[l] != FF_NO_ROW)
 			lobe[l & 1] = fmax(lobe[l & 1], x->row[t->link_row[l] * x->bands + k]);
-	return q + mt->rho_s[at] * lobe[0] + mt->tau_s[at] * lobe[1];
+	return sum + mt->rho_s[at] * lobe[0] + mt->tau_s[at] * lobe[1];
 }
 
-static double albedo_shot(const struct transport *t, uint32_t ps, size_t k)
-{
-	const struct materials *mt = &t->m->material;
-	uint32_t material = model_patch_material(t->m, ps >> 1);
-	int side = (int)(ps & 1);
-	size_t at = material_at(mt, material, side) + k;
-
-	return mt->rho_d[at] + mt->tau_d[at] +
-	       (bsdf_has_lobe(mt, material, side, 0) ? mt->rho_s[at] : 0) +
-	       (bsdf_has_lobe(mt, material, side, 1) ? mt->tau_s[at] : 0);
-}
-
-/* One step for all sides; the largest q. */
-static double sides_step(struct tail *x, int first)
+/* D becomes T D, and is added to N; the ratios. */
+static void sides_step(struct tail *x)
 {
 	const struct model *m = x->t->m;
-	double top = 0;
 
-	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
+	memset(x->ratio, 0, x->parts->n * sizeof *x->ratio);
+	for (uint32_t ps = 0; ps < 2 * m->patches; ps++) {
+		double *d = (double *)(x->d + ps * x->vectors);
+		double *n = (double *)(x->n + ps * x->vectors);
+		double *ratio = &x->ratio[x->parts->of[ps]];
 		for (size_t k = 0; k < x->bands; k++) {
-			double *q = (double *)(x->q + ps * x->groups) + k;
-			*q = !model_side_modelled(m, ps) ? 0
-			   : first ? albedo_shot(x->t, ps, k) : side_step(x, ps, k);
-			top = fmax(top, *q);
+			double next = model_side_modelled(m, ps) ? side_step(x, ps, k) : 0;
+			if (next > 0)
+				*ratio = fmax(*ratio, next / d[k]);
+			d[k] = next;
+			n[k] += next;
 		}
-	return top;
-}
-
-static double series(struct tail *x, int threads)
-{
-	double sum = 1, top = sides_step(x, 1);
-
-	for (int k = 1; k < STEPS && top > .5; k++) {
-		sum += top;
-		par_for(x->t->rows, 64, threads, rows_step, x, NULL);
-		x->bytes += (double)(x->t->runs * x->groups) *
-		            (sizeof *x->t->run_target + sizeof *x->t->run_sum);
-		top = sides_step(x, 0);
 	}
-	return top < 1 ? sum / (1 - top) * x->arrivals : INFINITY;
 }
 
-double radiosity_tail_bound(const struct transport *t, int threads, double *bytes)
+/* The largest part of 1 + N anywhere that is not summed but bounded; infinite without
+ * a bound. With `add` it is added to N. */
+static double remainder_of(struct tail *x, int add)
+{
+	double worst = 0;
+
+	for (uint32_t ps = 0; ps < 2 * x->t->m->patches; ps++)
+		for (size_t k = 0; k < x->bands; k++) {
+			double d = ((double *)(x->d + ps * x->vectors))[k];
+			double *n = (double *)(x->n + ps * x->vectors) + k;
+			double q = x->ratio[x->parts->of[ps]];
+			double rest = !(d > 0) ? 0 : q < 1 ? d * q / (1 - q) : INFINITY;
+			worst = fmax(worst, isfinite(rest) ? rest / (1 + *n + rest) : INFINITY);
+			if (add)
+				*n += rest;
+		}
+	return worst;
+}
+
+/* 1 + N. 0 if it has no bound. */
+static int arrivals(struct tail *x, int threads)
+{
+	const size_t all = 2 * x->t->m->patches * x->vectors;
+	double rest = INFINITY, before;
+
+	for (size_t i = 0; i < all; i++)
+		x->d[i] = (lanes){ 1, 1, 1, 1 };
+	for (int k = 0; k < STEPS && rest > loose; k++) {
+		all_rows(x, x->d, threads);
+		sides_step(x);
+		before = rest;
+		rest = remainder_of(x, 0);
+		/* A geometric series: the bound is as sharp as it will get. */
+		if (isfinite(rest) && rest > .98 * before && k > 8)
+			break;
+	}
+	if (!isfinite(remainder_of(x, 1)))
+		return 0;
+	for (size_t i = 0; i < all; i++)
+		x->n[i] += 1;
+	return 1;
+}
+
+/* What x->row makes of a row's unshot flux in all groups. */
+static double row_bound(const struct tail *x, uint32_t row, const double *unshot, size_t groups)
+{
+	double sum = 0;
+
+	for (size_t c = 0; row != FF_NO_ROW && c < groups * x->bands; c++)
+		sum += fabs(unshot[c]) * x->row[row * x->bands + c % x->bands];
+	return sum;
+}
+
+static double all_bounds(const struct tail *x, const struct solution *s)
+{
+	const struct transport *t = x->t;
+	size_t channels = solution_channels(s);
+	double sum = 0;
+
+	for (uint32_t ps = 0; ps < s->patch_sides; ps++) {
+		uint32_t row = t->diffuse_row[ps], lobe = t->emission_row[ps];
+		sum += row_bound(x, lobe != FF_NO_ROW ? lobe : row,
+		                 s->unshot_emission + ps * x->bands, 1);
+		sum += row_bound(x, row, s->unshot_diffuse + ps * channels, s->groups);
+	}
+	for (size_t l = 0; l < 2 * s->links; l++) {
+		const double *unshot = s->unshot_link + l * channels;
+		const uint32_t *row = t->link_row + (l & ~(size_t)1);
+		sum += fmax(row_bound(x, row[0], unshot, s->groups),
+		            row_bound(x, row[1], unshot, s->groups));
+	}
+	return sum;
+}
+
+double radiosity_tail_bound(const struct transport *t, const struct components *parts,
+                            const struct solution *s, int threads, double *bytes)
 {
 	struct err e = { 0 };
 	struct sender sender;
 	size_t bands = (size_t)t->m->bands;
-	struct tail x = { .t = t, .bands = bands, .groups = lanes_groups(t->m->bands),
-	                  .arrivals = 1 };
-	void *room;
+	struct tail x = { .t = t, .bands = bands, .vectors = lanes_vectors(bands),
+	                  .parts = parts };
+	void *room[2];
 	double bound = INFINITY;
 
 	x.in = mem_new(t->blocks, bands * sizeof(double), "bound", &e);
 	x.row = mem_new(t->rows, bands * sizeof(double), "bound", &e);
-	x.q = lanes_new(2 * t->m->patches * x.groups, &room, "bound", &e);
-	if (sender_init(&sender, t, &e) == 0 && x.in && x.row && x.q) {
+	x.ratio = mem_new(parts->n, sizeof *x.ratio, "bound", &e);
+	x.d = lanes_new(2 * t->m->patches * x.vectors, &room[0], "bound", &e);
+	x.n = lanes_new(2 * t->m->patches * x.vectors, &room[1], "bound", &e);
+	if (sender_init(&sender, t, 1, &e) == 0 && x.in && x.row && x.ratio && x.d && x.n) {
 		unit_rows(&x, &sender);
-		bound = series(&x, threads);
+		if (arrivals(&x, threads)) {
+			all_rows(&x, x.n, threads);
+			bound = all_bounds(&x, s);
+		}
 		*bytes += x.bytes;
 	}
 	sender_free(&sender);
 	free(x.in);
 	free(x.row);
-	free(room);
+	free(x.ratio);
+	free(room[0]);
+	free(room[1]);
 	return bound;
 }

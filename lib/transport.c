@@ -293,12 +293,12 @@ static ALWAYS_INLINE void add_entry(struct runs *r, uint32_t target, double valu
 static ALWAYS_INLINE void add_list(const struct transport *t, const struct ff *f, uint64_t b,
                                    struct runs *to, int sums)
 {
-	const uint32_t *column = f->column + ff_block_column(f)[b];
-	uint64_t first = f->block_start[b], n = f->block_start[b + 1] - first;
+	uint64_t word = ff_first_word(f, b), first = f->block_start[b], n = f->block_start[b + 1] - first;
 	struct runs r = *to;
 
 	for (uint64_t i = 0; i < n; i++)
-		add_entry(&r, target_of(t, f, column[i]), sums ? ff_value(f, first + i) : 0, sums);
+		add_entry(&r, target_of(t, f, ff_word(f, word + i)),
+		          sums ? ff_value(f, first + i) : 0, sums);
 	*to = r;
 }
 

@@ -106,7 +106,7 @@ static double area(const struct pairs *p, size_t i)
  * what float32 values leave. */
 static double variance(const struct pairs *p, size_t i, double flow)
 {
-	double error = area(p, i) * p->pm.f->row_error[p->pm.row[i]], rounding = 1e-6 * flow;
+	double error = area(p, i) * (double)p->pm.f->row_error[p->pm.row[i]], rounding = 1e-6 * flow;
 
 	return error * error + rounding * rounding;
 }
@@ -181,7 +181,7 @@ static double worst_closure(const struct ff *f, double *residual)
 		for (uint64_t k = f->block_start[b]; k < f->block_start[b + 1]; k++)
 			sum += ff_value(f, k);
 		worst = fmax(worst, fabs(1 - f->row_scale[r] * sum));
-		*residual = fmax(*residual, fabs(f->row_residual[r]));
+		*residual = fmax(*residual, fabs((double)f->row_residual[r]));
 	}
 	return worst;
 }
@@ -211,15 +211,34 @@ int verify_ff(const struct ff *f, const struct ff_scene *s, struct verify *v, st
 
 /* ---- solutions ---- */
 
-static double unshot(const struct solution *s, size_t band)
+/* Unshot flux of a band, or the sum of its magnitudes. */
+static double unshot(const struct solution *s, size_t band, int magnitude)
 {
-	const size_t bands = (size_t)s->bands;
+	const size_t bands = (size_t)s->bands, channels = solution_channels(s);
+	const struct {
+		const double *flux;
+		size_t n, channels;
+	} list[] = { { s->unshot_emission, s->patch_sides, bands },
+	             { s->unshot_diffuse, s->patch_sides, channels },
+	             { s->unshot_link, 2 * s->links, channels } };
 	double sum = 0;
 
-	for (size_t i = 0; i < s->patch_sides; i++)
-		sum += s->unshot_emission[i * bands + band] + s->unshot_diffuse[i * bands + band];
-	for (size_t i = 0; i < 2 * s->links; i++)
-		sum += s->unshot_link[i * bands + band];
+	for (size_t k = 0; k < sizeof list / sizeof *list; k++)
+		for (size_t i = 0; i < list[k].n; i++)
+			for (size_t c = band; c < list[k].channels; c += bands) {
+				double x = list[k].flux[i * list[k].channels + c];
+				sum += magnitude ? fabs(x) : x;
+			}
+	return sum;
+}
+
+/* A term of the ledger for a band, all groups. */
+static double ledger(const struct solution *s, int term, size_t band)
+{
+	double sum = 0;
+
+	for (size_t g = 0; g < s->groups; g++)
+		sum += s->ledger[((size_t)term * s->groups + g) * (size_t)s->bands + band];
 	return sum;
 }
 
@@ -251,15 +270,14 @@ void verify_solution(const struct model *m, const struct solution *s, struct ver
 
 	*v = (struct verify){ 0 };
 	for (size_t b = 0; b < bands; b++) {
-		const double *l = s->ledger + b;
-		double emitted = l[LEDGER_EMITTED * bands], rest = unshot(s, b);
+		double emitted = ledger(s, LEDGER_EMITTED, b), sum = unshot(s, b, 0);
 		if (!(emitted > 0))
 			continue;
-		double sum = l[LEDGER_ABSORBED * bands] + l[LEDGER_ESCAPED * bands] +
-		             l[LEDGER_LOST * bands] + l[LEDGER_CUT * bands] + rest;
-		double at_elements = l[LEDGER_ABSORBED * bands] - absorbed(m, s, (int)b);
+		for (int term = LEDGER_ABSORBED; term < LEDGER_TERMS; term++)
+			sum += ledger(s, term, b);
+		double at_elements = ledger(s, LEDGER_ABSORBED, b) - absorbed(m, s, (int)b);
 		residual = fmax(residual, fabs(emitted - sum) / emitted);
-		left = fmax(left, rest / emitted);
+		left = fmax(left, unshot(s, b, 1) / emitted);
 		/* Black backs absorb too, without an irradiance of their own. */
 		missing = fmax(missing, (all_two_sided(m) ? fabs(at_elements) : -at_elements) /
 		                        emitted);

@@ -5,12 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bsdf.h"
 #include "mem.h"
 #include "rng.h"
 #include "view_path.h"
-
-static const double pi = 3.14159265358979323846;
+#include "view_shade.h"
 
 enum { TILE = 16 };
 
@@ -25,6 +23,13 @@ struct tile_sum {
 	double radiance, cut;
 };
 
+/* A thread's scratch space: pixels of one tile at a time. */
+struct worker {
+	struct view_branch *stack;
+	struct view_shader shader;
+	struct view_sums sums;
+};
+
 struct render {
 	const struct view_scene *v;
 	const struct view_frame *f;
@@ -32,106 +37,10 @@ struct render {
 	struct image *picture;
 	struct planes at;
 	double (*spot)[2];          /* [samples] positions in the pixel */
-	struct view_branch **stack; /* [threads] */
+	struct worker *worker;      /* [threads] */
 	struct tile_sum *tile;
 	size_t across;              /* tiles in a row */
 };
-
-/* ---- what all views share ---- */
-
-static struct view_lobe lobe_of(const double *coefficient, int bands, double k)
-{
-	for (int b = 0; b < bands; b++)
-		if (coefficient[b] > 0)
-			return (struct view_lobe){ coefficient, k };
-	return (struct view_lobe){ NULL, 0 };
-}
-
-static void tabulate_side(const struct materials *mt, size_t material, int side,
-                          struct view_side *s)
-{
-	size_t here = material_at(mt, material, side), across = material_at(mt, material, !side);
-
-	s->black = side == BACK && mt->one_sided[material];
-	for (int b = 0; b < mt->bands; b++) {
-		s->here[b] = mt->rho_d[here + (size_t)b] / pi;
-		s->across[b] = mt->tau_d[across + (size_t)b] / pi;
-		s->translucent |= s->across[b] > 0;
-		s->emits |= mt->emission[here + (size_t)b] > 0;
-	}
-	s->reflected = lobe_of(&mt->rho_s[here], mt->bands,
-	                       mt->alpha[2 * material + (size_t)side]);
-	s->transmitted = lobe_of(&mt->tau_s[across], mt->bands,
-	                         mt->beta[2 * material + (size_t)!side]);
-}
-
-/* U with L_e + M/pi + s U <= U for what one corner of an element-side shows, s its
- * directional weight: then no tail brings more than the largest U of the scene. */
-static double corner_ceiling(const struct view_scene *v, size_t material, int side,
-                             const float *h, int band)
-{
-	const struct materials *mt = &v->m->material;
-	const struct view_side *s = &v->side[2 * material + (size_t)side];
-	double m = mt->emission_exponent[2 * material + (size_t)side];
-	double own = mt->emission[material_at(mt, material, side) + (size_t)band];
-	double kept = 1;
-
-	if (own > 0 && m < 1)
-		return (double)INFINITY;
-	own += s->here[band] * (double)h[side * mt->bands + band] +
-	       s->across[band] * (double)h[!side * mt->bands + band];
-	if (s->reflected.coefficient)
-		kept -= s->reflected.coefficient[band];
-	if (s->transmitted.coefficient)
-		kept -= s->transmitted.coefficient[band];
-	if (kept < -1e-6)
-		return (double)INFINITY;
-	return own > 0 ? own / fmax(kept, 0) : 0;
-}
-
-static void find_ceiling(struct view_scene *v)
-{
-	const struct model *m = v->m;
-	size_t bands = (size_t)m->bands;
-
-	for (size_t c = 0; c < 3 * m->elements; c++) {
-		size_t material = model_patch_material(m, m->element_patch[c / 3]);
-		for (int side = 0; side < 2; side++)
-			for (int b = 0; b < m->bands && !v->side[2 * material + (size_t)side].black; b++)
-				v->ceiling[b] = fmax(v->ceiling[b],
-				                     corner_ceiling(v, material, side,
-				                                    v->h->corner + 2 * bands * c, b));
-	}
-}
-
-struct view_scene *view_scene_new(const struct model *m, const struct ray_scene *rays,
-                                  const struct reconstruction *h, struct err *e)
-{
-	struct view_scene *v = mem_new(1, sizeof *v, "view", e);
-
-	if (!v)
-		return NULL;
-	v->m = m;
-	v->rays = rays;
-	v->h = h;
-	v->side = mem_new(2 * m->material.n, sizeof *v->side, "materials of the view", e);
-	if (!v->side) {
-		free(v);
-		return NULL;
-	}
-	for (size_t i = 0; i < 2 * m->material.n; i++)
-		tabulate_side(&m->material, i / 2, (int)(i % 2), &v->side[i]);
-	find_ceiling(v);
-	return v;
-}
-
-void view_scene_free(struct view_scene *v)
-{
-	if (!v)
-		return;
-	free(v->side);
-	free(v);
-}
 
 /* ---- layers ---- */
 
@@ -236,67 +145,90 @@ static void store_first(const struct render *r, size_t pixel, double x, double y
 		      seen ? r->v->m->element_patch[first.element] : -1.);
 }
 
-static void trace_pixel(const struct render *r, struct view_walker *w,
-                        struct view_branch *b, int i, int j)
+/* Follows the samples of a pixel; their light goes into sums [pixels][bands]. */
+static void follow_pixel(const struct render *r, struct view_walker *w, int i, int j)
 {
 	uint64_t id = (uint64_t)j * (uint64_t)r->f->width + (uint64_t)i, seed = rng_mix(id);
-	int bands = r->v->m->bands, n = r->o->samples;
+	size_t bands = (size_t)r->v->m->bands;
+	struct view_branch b;
 
-	memset(w->diffuse, 0, (size_t)bands * sizeof *w->diffuse);
-	memset(w->directional, 0, (size_t)bands * sizeof *w->directional);
-	memset(w->emission, 0, (size_t)bands * sizeof *w->emission);
-	for (int s = 0; s < n; s++) {
-		camera_ray(r->f, i + r->spot[s][0], j + r->spot[s][1], b->org, b->dir);
-		b->index = (uint32_t)s;
-		b->seed = seed;
-		view_follow(w, b);
+	memset(w->diffuse, 0, bands * sizeof *w->diffuse);
+	memset(w->directional, 0, bands * sizeof *w->directional);
+	memset(w->emission, 0, bands * sizeof *w->emission);
+	for (int s = 0; s < r->o->samples; s++) {
+		camera_ray(r->f, i + r->spot[s][0], j + r->spot[s][1], b.org, b.dir);
+		b.index = (uint32_t)s;
+		b.seed = seed;
+		view_follow(w, &b);
 	}
-	double total[BANDS_MAX], share = 1. / n;
+}
+
+static void keep_pixel(const struct view_walker *w, size_t bands, const struct view_sums *to)
+{
+	memcpy(to->diffuse + w->pixel * bands, w->diffuse, bands * sizeof *w->diffuse);
+	memcpy(to->directional + w->pixel * bands, w->directional, bands * sizeof *w->diffuse);
+	memcpy(to->emission + w->pixel * bands, w->emission, bands * sizeof *w->diffuse);
+	memset(to->square + w->pixel * bands, 0, bands * sizeof *w->diffuse);
+}
+
+/* Stores pixel `at` of the sums as pixel (i, j). Returns its radiance, bands added up. */
+static double store_pixel(const struct render *r, const struct view_sums *from, size_t at, int i,
+                          int j)
+{
+	size_t id = (size_t)j * (size_t)r->f->width + (size_t)i;
+	int bands = r->v->m->bands;
+	double *diffuse = from->diffuse + at * (size_t)bands;
+	double *directional = from->directional + at * (size_t)bands;
+	double *emission = from->emission + at * (size_t)bands;
+	double total[BANDS_MAX], share = 1. / r->o->samples, sum = 0;
+
 	for (int k = 0; k < bands; k++) {
-		w->diffuse[k] *= share;
-		w->directional[k] *= share;
-		w->emission[k] *= share;
-		total[k] = w->diffuse[k] + w->directional[k] + w->emission[k];
+		diffuse[k] *= share;
+		directional[k] *= share;
+		emission[k] *= share;
+		sum += total[k] = diffuse[k] + directional[k] + emission[k];
 	}
 	store_colour(r, 0, id, total);
 	for (int k = 0; k < bands && r->at.bands >= 0; k++)
 		store(r, r->at.bands + k, id, total[k]);
-	store_colour(r, r->at.diffuse, id, w->diffuse);
-	store_colour(r, r->at.directional, id, w->directional);
-	store_colour(r, r->at.emission, id, w->emission);
+	store_colour(r, r->at.diffuse, id, diffuse);
+	store_colour(r, r->at.directional, id, directional);
+	store_colour(r, r->at.emission, id, emission);
 	if (r->o->layers & (VIEW_Z | VIEW_N | VIEW_ELEMENT | VIEW_PATCH))
 		store_first(r, id, i + .5, j + .5);
+	return sum;
 }
 
-static double pixel_radiance(const struct view_walker *w, int bands)
+static void trace_tile(const struct render *r, struct worker *k, size_t tile)
 {
-	double sum = 0;
+	struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack,
+		                 .shader = r->v->method == VIEW_MESH ? NULL : &k->shader };
+	int i0 = (int)(tile % r->across) * TILE, j0 = (int)(tile / r->across) * TILE;
+	int i1 = i0 + TILE < r->f->width ? i0 + TILE : r->f->width;
+	int j1 = j0 + TILE < r->f->height ? j0 + TILE : r->f->height;
+	struct tile_sum *sum = &r->tile[tile];
 
-	for (int b = 0; b < bands; b++)
-		sum += w->diffuse[b] + w->directional[b] + w->emission[b];
-	return sum;
+	for (int j = j0; j < j1; j++)
+		for (int i = i0; i < i1; i++, w.pixel++) {
+			follow_pixel(r, &w, i, j);
+			keep_pixel(&w, (size_t)r->v->m->bands, &k->sums);
+		}
+	if (w.shader)
+		view_shader_run(w.shader, &k->sums);
+	for (int j = j0, at = 0; j < j1; j++)
+		for (int i = i0; i < i1; i++, at++)
+			sum->radiance += store_pixel(r, &k->sums, (size_t)at, i, j);
+	for (int b = 0; b < r->v->m->bands; b++)
+		sum->cut += w.cut[b] / r->o->samples;
+	sum->rays = w.rays;
 }
 
 static void trace_tiles(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct render *r = arg;
-	int bands = r->v->m->bands;
-	struct view_branch primary;
 
-	for (size_t t = begin; t < end; t++) {
-		struct view_walker w = { .v = r->v, .o = r->o, .stack = r->stack[thread] };
-		int i0 = (int)(t % r->across) * TILE, j0 = (int)(t / r->across) * TILE;
-		struct tile_sum sum = { 0 };
-		for (int j = j0; j < j0 + TILE && j < r->f->height; j++)
-			for (int i = i0; i < i0 + TILE && i < r->f->width; i++) {
-				trace_pixel(r, &w, &primary, i, j);
-				sum.radiance += pixel_radiance(&w, bands);
-			}
-		for (int b = 0; b < bands; b++)
-			sum.cut += w.cut[b] / r->o->samples;
-		sum.rays = w.rays;
-		r->tile[t] = sum;
-	}
+	for (size_t t = begin; t < end; t++)
+		trace_tile(r, &r->worker[thread], t);
 }
 
 /* The bits of i mirrored at the point: .0, .1, .01, .11, .001, ... (van der Corput). */
@@ -309,18 +241,42 @@ static double radical_inverse(uint32_t i)
 	return x;
 }
 
+static int new_worker(const struct render *r, struct worker *k, struct err *e)
+{
+	size_t values = TILE * TILE * (size_t)r->v->m->bands;
+	struct view_sums *s = &k->sums;
+
+	k->stack = mem_new(view_stack_size(r->o), sizeof *k->stack, "ray stacks", e);
+	s->diffuse = mem_new(4 * values, sizeof *s->diffuse, "pixels", e);
+	if (!k->stack || !s->diffuse)
+		return -1;
+	s->directional = s->diffuse + values;
+	s->emission = s->directional + values;
+	s->square = s->emission + values;
+	return r->v->method == VIEW_MESH ? 0 : view_shader_init(&k->shader, r->v, e);
+}
+
+static void free_workers(struct render *r)
+{
+	for (int t = 0; t < r->o->threads && r->worker; t++) {
+		free(r->worker[t].stack);
+		free(r->worker[t].sums.diffuse);
+		view_shader_free(&r->worker[t].shader);
+	}
+	free(r->worker);
+}
+
 static int new_buffers(struct render *r, size_t tiles, struct err *e)
 {
 	int n = r->o->samples;
 
 	r->tile = mem_new(tiles, sizeof *r->tile, "tiles", e);
 	r->spot = mem_new((size_t)n, sizeof *r->spot, "pixel samples", e);
-	r->stack = mem_new((size_t)r->o->threads, sizeof *r->stack, "ray stacks", e);
-	if (!r->tile || !r->spot || !r->stack)
+	r->worker = mem_new((size_t)r->o->threads, sizeof *r->worker, "threads", e);
+	if (!r->tile || !r->spot || !r->worker)
 		return -1;
 	for (int t = 0; t < r->o->threads; t++)
-		if (!(r->stack[t] = mem_new(view_stack_size(r->o), sizeof **r->stack,
-		                            "ray stacks", e)))
+		if (new_worker(r, &r->worker[t], e))
 			return -1;
 	/* Hammersley points, the same in every pixel: edges come out regular. */
 	for (int i = 0; i < n; i++) {
@@ -342,6 +298,14 @@ static void sum_tiles(const struct render *r, size_t tiles, struct view_stats *s
 	}
 }
 
+static int failed(const struct render *r, struct err *e)
+{
+	for (int t = 0; t < r->o->threads; t++)
+		if (r->worker[t].shader.e.set)
+			return err_set(e, "%s", r->worker[t].shader.e.text);
+	return 0;
+}
+
 int view_render(const struct view_scene *v, const struct view_frame *f,
                 const struct view_options *o, const struct progress *progress,
                 struct image *picture, struct view_stats *stats, struct err *e)
@@ -356,11 +320,9 @@ int view_render(const struct view_scene *v, const struct view_frame *f,
 	if (!new_buffers(&r, tiles, e) && !new_picture(&r, picture, e)) {
 		par_for(tiles, 1, o->threads, trace_tiles, &r, progress);
 		sum_tiles(&r, tiles, stats);
-		bad = 0;
+		bad = failed(&r, e);
 	}
-	for (int t = 0; t < o->threads && r.stack; t++)
-		free(r.stack[t]);
-	free(r.stack);
+	free_workers(&r);
 	free(r.spot);
 	free(r.tile);
 	return bad;

@@ -16,7 +16,7 @@
 #include "model.h"
 #include "par.h"
 #include "ray.h"
-#include "reconstruct.h"
+#include "solution.h"
 
 /* Layers beside R, G, B. Z, N, element and patch are those at the pixel's centre:
  * Z the camera depth (infinite where nothing is seen), N the geometric normal of
@@ -25,6 +25,10 @@ enum {
 	VIEW_DIFFUSE = 1, VIEW_DIRECTIONAL = 2, VIEW_EMISSION = 4, VIEW_Z = 8,
 	VIEW_N = 16, VIEW_ELEMENT = 32, VIEW_PATCH = 64, VIEW_ALL = 127
 };
+
+/* Where diffuse light comes from: all of it interpolated between the elements; that from
+ * emitters, straight, computed for each point. */
+enum view_method { VIEW_MESH, VIEW_DIRECT };
 
 struct view_options {
 	int samples;       /* a pixel; 1 = its centre, else stratified over it */
@@ -45,10 +49,11 @@ struct view_stats {
 
 struct view_scene;
 
-/* What all views share: tables of materials and the brightest radiance. m, rays
- * and h must outlive it. NULL and e on failure. O(elements). */
-struct view_scene *view_scene_new(const struct model *m, const struct ray_scene *rays,
-                                  const struct reconstruction *h, struct err *e);
+/* What all views share: tables of materials, interpolated irradiance, the brightest
+ * radiance, emitters. m and rays must outlive it. NULL and e on failure. O(elements). */
+struct view_scene *view_scene_new(const struct model *m, const struct solution *s,
+                                  const struct ray_scene *rays, enum view_method method,
+                                  int threads, struct err *e);
 void view_scene_free(struct view_scene *v);
 
 /* The mask of a comma-separated list of layers (diffuse, directional, emission, Z,

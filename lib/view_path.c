@@ -7,6 +7,7 @@
 #include "lobe.h"
 #include "rng.h"
 #include "vec3.h"
+#include "view_shade.h"
 
 /* Backs of one-sided materials in a row that a ray may pass. */
 enum { PASSES_MAX = 4096 };
@@ -90,21 +91,37 @@ static int see(const struct view_scene *v, const double org[3], const double dir
 	return 1;
 }
 
+/* Has the rest of the light at a point computed and added later. */
+static void put_request(struct view_walker *w, const struct view_branch *b, struct point *p)
+{
+	struct view_request q = { .element = p->element, .side = p->side, .pixel = w->pixel,
+	                          .material = p->material, .directional = b->depth > 0,
+	                          .seed = b->seed + b->index };
+
+	locate(w->v, p);
+	memcpy(q.x, p->x, sizeof q.x);
+	memcpy(q.w, p->w, sizeof q.w);
+	view_shader_put(w->shader, &q, b->weight);
+}
+
 /* Adds what the point itself sends: emission and M / pi. */
-static void add_radiance(struct view_walker *w, const struct view_branch *b,
-                         const struct point *p)
+static void add_radiance(struct view_walker *w, const struct view_branch *b, struct point *p)
 {
 	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
 	size_t bands = (size_t)w->v->m->bands;
 	double h[BANDS_MAX];
 	double *diffuse = b->depth ? w->directional : w->diffuse;
 	double *emission = b->depth ? w->directional : w->emission;
+	int computed = w->shader && !b->lobes && b->depth <= VIEW_COMPUTED_DEPTH;
+	const struct reconstruction *r = computed ? &w->v->part : &w->v->all;
 
-	reconstruction_at(w->v->h, p->element, p->side, p->w, h);
+	if (computed && (s->diffuse || s->translucent))
+		put_request(w, b, p);
+	reconstruction_at(r, p->element, p->side, p->w, h);
 	for (size_t i = 0; i < bands; i++)
 		diffuse[i] += b->weight[i] * s->here[i] * h[i];
 	if (s->translucent) {
-		reconstruction_at(w->v->h, p->element, !p->side, p->w, h);
+		reconstruction_at(r, p->element, !p->side, p->w, h);
 		for (size_t i = 0; i < bands; i++)
 			diffuse[i] += b->weight[i] * s->across[i] * h[i];
 	}

@@ -4,6 +4,8 @@
 
 #include <stdint.h>
 
+#include "direct.h"
+#include "reconstruct.h"
 #include "view.h"
 
 /* What one side of a material does with directional light that leaves it towards
@@ -16,17 +18,25 @@ struct view_lobe {
 struct view_side {
 	double here[BANDS_MAX];     /* rho_d / pi of this side */
 	double across[BANDS_MAX];   /* tau_d / pi of the other side */
-	int translucent, emits, black;
+	int diffuse, translucent, emits, black;
 	struct view_lobe reflected, transmitted;
 };
 
 struct view_scene {
 	const struct model *m;
 	const struct ray_scene *rays;
-	const struct reconstruction *h;
+	enum view_method method;
+	struct reconstruction all;  /* irradiance by all paths; empty where it is not needed */
+	struct reconstruction part; /* what of it is not computed for each point */
+	struct direct *direct;
 	struct view_side *side;     /* [2 materials] */
+	int tails;                  /* something reflects or transmits directionally */
 	double ceiling[BANDS_MAX];  /* no radiance along an unsampled tail exceeds it */
 };
+
+/* Up to how many directional events from the eye light is computed rather than
+ * interpolated; behind a lobe that is sampled it is always interpolated. */
+enum { VIEW_COMPUTED_DEPTH = 4 };
 
 /* A ray still to be followed. */
 struct view_branch {
@@ -46,9 +56,13 @@ struct view_first {
 	double point[3], normal[3];
 };
 
+struct view_shader;
+
 struct view_walker {
 	const struct view_scene *v;
 	const struct view_options *o;
+	struct view_shader *shader; /* for points whose light is to be computed; NULL: none is */
+	uint32_t pixel;             /* that it is told with them */
 	struct view_branch *stack;
 	size_t waiting;
 	double diffuse[BANDS_MAX], directional[BANDS_MAX], emission[BANDS_MAX];

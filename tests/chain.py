@@ -58,6 +58,19 @@ def container(path):
     return meta, arrays
 
 
+def form_factors(path):
+    """The same of a .ff file, with the arrays of rows and blocks that it leaves out, ff(5)."""
+    meta, arrays = container(path)
+    rows, blocks = len(arrays["row_scale"]), len(arrays["block_column"])
+    arrays.setdefault("row_side", 2 * np.arange(rows))
+    arrays.setdefault("row_block", np.arange(rows + 1))
+    for name in ("row_kind", "row_samples"):
+        arrays.setdefault(name, np.zeros(rows, int))
+    for name in ("chain", "escape", "black", "lost", "cut"):
+        arrays.setdefault("block_" + name, np.zeros(blocks))
+    return meta, arrays
+
+
 def table(text):
     """A CSV with a header as a list of dictionaries; numbers are floats."""
     def value(name, text):

@@ -2,7 +2,8 @@
 """check_formats.py MAN FILE...: do the section-5 pages in directory MAN and the
 cache files agree? Every array of a file must be in its pages with this dtype and
 shape (sizes like P+1 or 2E must mean the same throughout a file) and every array
-in the pages must be in the file; likewise the metadata. The programs in the EXAMPLES of
+in the pages must be in the file, unless the page says what its absence means; likewise
+the metadata. The programs in the EXAMPLES of
 mesh.5 and ff.5 must be tests/read_cache.py and tests/read_row.py."""
 
 import json
@@ -27,17 +28,19 @@ def page_items(path):
 
 
 def documented(man, kind):
-    arrays, metadata = {}, set()
+    arrays, absent, metadata = {}, set(), set()
     for page in PAGES[kind]:
         for _, cells in page_items(os.path.join(man, page)):
             if len(cells) == 5:
                 arrays[cells[0]] = (cells[1].split("|"), cells[2].strip("[]").split(","))
+                if "absent: " in cells[4]:
+                    absent.add(cells[0])
             elif page == "mesh.5" or len(cells) == 2:
                 metadata.add(cells[0])
     if kind == "twopass.ff":
         metadata |= {cells[0] for heading, cells in page_items(os.path.join(man, "mesh.5"))
                      if heading == COMMON}
-    return arrays, metadata
+    return arrays, absent, metadata
 
 
 def size_of(text, sizes, have):
@@ -53,9 +56,9 @@ def check(man, path):
     with open(path, "rb") as f:
         header = json.loads(f.read(int.from_bytes(f.read(8), "little")))
     meta = header.pop("__metadata__")
-    arrays, metadata = documented(man, meta["format"])
+    arrays, absent, metadata = documented(man, meta["format"])
     sizes, wrong = {}, []
-    for name in sorted(arrays.keys() - header.keys()):
+    for name in sorted(arrays.keys() - header.keys() - absent):
         wrong.append(f"array {name} is in the page, not in the file")
     for name, h in header.items():
         if name not in arrays:

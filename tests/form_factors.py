@@ -32,7 +32,7 @@ import time
 import numpy as np
 
 sys.dont_write_bytecode = True
-from chain import DATA, Failed, Tap, container, run
+from chain import DATA, Failed, Tap, container, form_factors, run
 from contour import REAL, area, visible_form_factor
 from polygon2gltf import Placement, polygon, write
 import random_polygons
@@ -99,7 +99,7 @@ class Result:
 def factors(ff, side):
     """F, stated error and what one sample weighs, emitter to receiver and back."""
     head, *lines = csv.reader(io.StringIO(run("inspect", "--patch-matrix", ff).stdout))
-    _, arrays = container(ff)
+    _, arrays = form_factors(ff)
     diffuse = arrays["row_kind"] == 0
     error, samples = arrays["row_error"][diffuse], arrays["row_samples"][diffuse]
     if len(error) != len(lines):

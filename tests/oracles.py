@@ -33,7 +33,7 @@ import time
 import numpy as np
 
 sys.dont_write_bytecode = True
-from chain import Failed, Tap, container, picture, run, table
+from chain import Failed, Tap, container, form_factors, picture, run, table
 from oracle2gltf import INSIDE, convert, oracles, unsupported
 
 LOBES = ["--lobe-rays", "262144"]
@@ -197,7 +197,7 @@ def reflected_fraction(oracle, method, e, field, ff):
     flux = lambda rows: (field.h[rows] * field.area[rows]).sum()
     ratio = flux(receiver) / (rho * flux(mirror)) if flux(mirror) else math.nan
     if ff:
-        _, arrays = container(ff)
+        _, arrays = form_factors(ff)
         error = arrays["row_error"][arrays["row_kind"] == REFLECTED].max(initial=0)
     else:
         spread = (field.error[receiver] * field.area[receiver])
@@ -240,7 +240,7 @@ def chain_field(rad):
 
 def ledger_of(arrays):
     terms = ("emitted", "absorbed", "escaped", "lost", "cut")
-    return dict(zip(terms, arrays["ledger"]))
+    return dict(zip(terms, arrays["ledger"].sum(1)))
 
 
 def particle_field(mesh, scene):

@@ -186,12 +186,11 @@ static void print_report(const struct ff_stats *s, const struct request *r, doub
 		fprintf(out, "pairs         %.0f clear, %.0f hidden, %.0f partly (%.1f evaluations each), "
 		        "%.0f sampled\n", s->pairs[0], s->pairs[1], s->pairs[2],
 		        s->evaluations / fmax(1, s->pairs[2]), s->pairs[3]);
-	if (s->curved)
-		fprintf(out, "by rays       %zu of %zu patch-sides are curved\n", s->curved, s->sides);
 	if (r->ff.to_patches && s->directional)
 		fprintf(out, "by rays       what is between patches: there are lobes, mirrors or panes\n");
-	else if (r->ff.to_patches && s->curved)
-		fprintf(out, "by rays       what is between patches: not all are plane\n");
+	if (s->curved)
+		fprintf(out, "by rays       %s %zu of %zu patch-sides: they are curved\n",
+		        r->ff.to_patches ? "pairs with" : "light from", s->curved, s->sides);
 	fprintf(out, "row sums      within %.3g of 1 before scaling\n", s->worst_residual);
 	fprintf(out, "row error     %.3g mean, %.3g worst (%s)\n", s->mean_error, s->worst_error,
 	        s->samples > 0 ? "standard error, root of squares over receivers"

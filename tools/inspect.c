@@ -488,7 +488,7 @@ static int print_row(const struct request *r, struct content *x, struct err *e)
 	printf("row       %" PRIu32 "\nfrom      %s\nkind      %s\nsamples   %" PRIu32
 	       "\nscale     %.17g\nresidual  %.17g\nerror     %.17g\n\n", row,
 	       name[f->row_side[row]], kind[f->row_kind[row]], f->row_samples[row],
-	       f->row_scale[row], f->row_residual[row], f->row_error[row]);
+	       f->row_scale[row], (double)f->row_residual[row], (double)f->row_error[row]);
 	printf("chain,to,element,value\n");
 	for (uint64_t b = f->row_block[row]; b < f->row_block[row + 1]; b++)
 		print_block_lines(&x->ff, name, row, b);

@@ -14,16 +14,18 @@
 #include "../formats/mesh_file.h"
 #include "../formats/rad_file.h"
 #include "../lib/discretisation.h"
+#include "../lib/light_groups.h"
 #include "../lib/mem.h"
 #include "../lib/radiosity.h"
 #include "common/cli.h"
 
-enum { OPT_RESUME = 256, OPT_LOG };
+enum { OPT_RESUME = 256, OPT_LOG, OPT_LIGHT_GROUPS };
 
 static const struct cli_option options[] = {
 	{ 'o', "output", "FILE", "write the solution to FILE (.rad)" },
 	{ 'e', "stop", "X", "stop when unshot / emitted flux is X everywhere (default 1e-4)" },
 	{ 'n', "shots", "N", "stop after N shots" },
+	{ OPT_LIGHT_GROUPS, "light-groups", NULL, "keep the light of each emitting material apart" },
 	{ OPT_RESUME, "resume", NULL, "go on from the solution in the output file" },
 	{ OPT_LOG, "log", "FILE", "a line a round: shots, unshot flux of each band, residual, seconds" },
 	{ 0, NULL, NULL, NULL }
@@ -33,7 +35,7 @@ struct request {
 	const char *mesh, *output, *log;
 	char *const *ff;
 	size_t shards;
-	int resume;
+	int resume, light_groups;
 	struct radiosity_options solve;
 };
 
@@ -64,6 +66,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		case 'o': r->output = optarg; break;
 		case 'e': r->solve.stop = cli_number(c, "--stop", optarg, 0, 1); break;
 		case 'n': r->solve.max_shots = (uint64_t)cli_integer(c, "--shots", optarg, 0, 0x7fffffffffffffff); break;
+		case OPT_LIGHT_GROUPS: r->light_groups = 1; break;
 		case OPT_RESUME: r->resume = 1; break;
 		case OPT_LOG: r->log = optarg; break;
 		}
@@ -142,6 +145,8 @@ static char *options_text(const struct request *r)
 
 	if (r->solve.max_shots != UINT64_MAX)
 		json_object_set_new(o, "shots", json_integer((json_int_t)r->solve.max_shots));
+	if (r->light_groups)
+		json_object_set_new(o, "light-groups", json_true());
 	if (r->resume)
 		json_object_set_new(o, "resume", json_true());
 	text = json_dumps(o, JSON_COMPACT | JSON_SORT_KEYS);
@@ -185,6 +190,19 @@ static int kept(struct job *j, const char *key, struct err *e)
 	return status ? -1 : 1;
 }
 
+/* Whether the solution keeps the light groups apart that were asked for. */
+static int same_groups(const struct job *j, struct err *e)
+{
+	struct solution want = { .bands = j->m.bands };
+	int same = light_groups_set(&want, &j->m, j->r->light_groups, e) == 0 &&
+	           want.groups == j->s.groups;
+
+	for (size_t g = 0; same && g < want.groups; g++)
+		same = strcmp(want.group_name[g], j->s.group_name[g]) == 0;
+	solution_free(&want);
+	return same;
+}
+
 /* The state of the solver in the output file, instead of the beginning. */
 static int resume(struct job *j, struct err *e)
 {
@@ -199,6 +217,8 @@ static int resume(struct job *j, struct err *e)
 		err_set(e, "%s: solves another scene; run shoot without --resume", path);
 	else if (j->s.rows != j->t.rows || j->s.links != j->t.links)
 		err_set(e, "%s: was made with other form factors; run shoot without --resume", path);
+	else if (!same_groups(j, e))
+		err_set(e, "%s: has other light groups; run shoot without --resume", path);
 	model_free(&old);
 	cache_info_free(&info);
 	return e->set ? -1 : 0;
@@ -236,7 +256,7 @@ static int solve(struct job *j, struct err *e)
 	if (j->r->resume && access(j->r->output, F_OK) == 0) {
 		if (resume(j, e))
 			return -1;
-	} else if (solution_begin(&j->s, &j->m, &j->t, e)) {
+	} else if (solution_begin(&j->s, &j->m, &j->t, j->r->light_groups, e)) {
 		return -1;
 	}
 	t1 = cli_seconds();
@@ -265,6 +285,16 @@ static json_t *number(double x)
 	return isfinite(x) ? json_real(x) : json_string("no finite bound");
 }
 
+/* A term of the ledger for a band, all light groups. */
+static double ledger_of(const struct solution *s, int term, int band)
+{
+	double sum = 0;
+
+	for (size_t g = 0; g < s->groups; g++)
+		sum += s->ledger[((size_t)term * s->groups + g) * (size_t)s->bands + (size_t)band];
+	return sum;
+}
+
 static char *report_text(const struct job *j)
 {
 	const struct radiosity_report *r = &j->report;
@@ -274,11 +304,11 @@ static char *report_text(const struct job *j)
 	for (int term = 0; term < LEDGER_TERMS; term++) {
 		json_t *band = json_array();
 		for (int k = 0; k < j->s.bands; k++)
-			json_array_append_new(band, json_real(j->s.ledger[term * j->s.bands + k]));
+			json_array_append_new(band, json_real(ledger_of(&j->s, term, k)));
 		json_object_set_new(ledger, term_name[term], band);
 	}
-	o = json_pack("{s:o, s:I, s:i, s:f, s:o, s:f, s:o, s:f, s:f, s:f}", "ledger", ledger,
-	              "shots", (json_int_t)j->s.shots, "components", r->components,
+	o = json_pack("{s:o, s:f, s:I, s:i, s:f, s:o, s:f, s:o, s:f, s:f, s:f}", "ledger", ledger,
+	              "passes", r->passes, "shots", (json_int_t)j->s.shots, "components", r->components,
 	              "unshot", r->unshot, "truncation_bound", number(r->bound),
 	              "guessed_directions", r->guessed, "ledger_residual", number(r->residual),
 	              "mean_error", solution_mean_error(&j->m, &j->s),
@@ -289,19 +319,29 @@ static char *report_text(const struct job *j)
 	return text;
 }
 
+static void print_groups(const struct solution *s, FILE *out)
+{
+	fprintf(out, "light groups ");
+	for (size_t g = 0; g < s->groups; g++)
+		fprintf(out, " %s", s->group_name[g]);
+	fprintf(out, "\n");
+}
+
 static void print_report(const struct job *j)
 {
 	const struct solution *s = &j->s;
 	const struct radiosity_report *r = &j->report;
 	FILE *out = strcmp(j->r->output, "-") ? stdout : stderr;
 
-	fprintf(out, "shots         %llu in %llu rounds, %d lit component%s\n",
-	       (unsigned long long)s->shots, (unsigned long long)r->rounds, r->components,
-	       r->components == 1 ? "" : "s");
+	fprintf(out, "shots         %llu in %llu rounds, %.1f matrix passes, %d lit component%s\n",
+	       (unsigned long long)s->shots, (unsigned long long)r->rounds, r->passes,
+	       r->components, r->components == 1 ? "" : "s");
+	if (j->r->light_groups)
+		print_groups(s, out);
 	for (int term = 0; term < LEDGER_TERMS; term++) {
 		fprintf(out, "%-13s", term_name[term]);
 		for (int k = 0; k < s->bands; k++)
-			fprintf(out, " %.9g", s->ledger[term * s->bands + k]);
+			fprintf(out, " %.9g", ledger_of(s, term, k));
 		fprintf(out, "\n");
 	}
 	fprintf(out, "unshot        %.3g of what is emitted\n", r->unshot);

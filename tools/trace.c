@@ -14,12 +14,13 @@
 #include "../formats/history.h"
 #include "../formats/rad_file.h"
 #include "../lib/camera.h"
+#include "../lib/light_groups.h"
 #include "../lib/mem.h"
 #include "../lib/view.h"
 #include "common/cli.h"
 
 enum { OPT_EYE = 256, OPT_TARGET, OPT_UP, OPT_FOV, OPT_SAMPLES, OPT_LOBE_SAMPLES, OPT_DEPTH,
-       OPT_CUTOFF, OPT_HALF, OPT_COMPRESSION, OPT_LAYERS };
+       OPT_CUTOFF, OPT_HALF, OPT_COMPRESSION, OPT_LAYERS, OPT_MIX };
 
 static const struct cli_option option_table[] = {
 	{ 'c', "camera", "NAME", "camera to render; repeatable, or 'all'" },
@@ -29,7 +30,7 @@ static const struct cli_option option_table[] = {
 	{ OPT_TARGET, "target", "X,Y,Z", "point it looks at" },
 	{ OPT_UP, "up", "X,Y,Z", "its upright direction (default: 0,1,0)" },
 	{ OPT_FOV, "fov", "DEGREES", "its vertical field of view (default: 50)" },
-	{ 'd', "diffuse", "METHOD", "where diffuse light comes from: mesh" },
+	{ 'd', "diffuse", "METHOD", "where diffuse light comes from: mesh (default) or direct" },
 	{ OPT_SAMPLES, "samples", "N", "positions in each pixel (default: 4; 1: its centre)" },
 	{ OPT_LOBE_SAMPLES, "lobe-samples", "N",
 	  "rays into a finite lobe (default: 0: one, about its axis)" },
@@ -39,6 +40,8 @@ static const struct cli_option option_table[] = {
 	  "also diffuse,directional,emission,Z,N,element,patch or all" },
 	{ OPT_HALF, "half", NULL, "colours as 16-bit floats" },
 	{ OPT_COMPRESSION, "compression", "METHOD", "zip (default), zips, piz, rle or none" },
+	{ OPT_MIX, "mix", "NAME=X,...",
+	  "scale the light of groups by X, or X:X:X for each band" },
 	{ 0, NULL, NULL, NULL }
 };
 
@@ -54,12 +57,13 @@ struct shot {
 struct trace {
 	struct cli cli;
 	/* options */
-	const char *rad, *output;
+	const char *rad, *output, *mix;
 	const char **camera;        /* [cameras] names asked for */
 	int cameras, all;
 	int width, height;
 	int has_eye, has_target, has_up;
 	double eye[3], target[3], up[3], fov;
+	enum view_method method;
 	struct view_options view;
 	struct exr_file_options exr;
 	/* the work */
@@ -71,7 +75,6 @@ struct trace {
 	struct model m;
 	struct solution s;
 	struct cache_info info;
-	struct reconstruction h;
 	struct ray_scene *rays;
 	struct view_scene *scene;
 	char *history;
@@ -92,12 +95,16 @@ static int vector(const struct cli *c, const char *option, const char *text, dou
 	return 1;
 }
 
-static void diffuse_method(const struct cli *c, const char *text)
+static void diffuse_method(struct trace *t, const char *text)
 {
-	if (strcmp(text, "direct") == 0 || strcmp(text, "gather") == 0)
-		cli_usage(c, "--diffuse: %s is not available in this version; use mesh", text);
-	if (strcmp(text, "mesh") != 0)
-		cli_usage(c, "--diffuse: there is no method '%s'; use mesh", text);
+	static const char *const name[] = { "mesh", "direct" };
+
+	for (int i = 0; i < 2; i++)
+		if (strcmp(text, name[i]) == 0) {
+			t->method = (enum view_method)i;
+			return;
+		}
+	cli_usage(&t->cli, "--diffuse: there is no method '%s'; use mesh or direct", text);
 }
 
 static void compression(struct trace *t, const char *text)
@@ -128,7 +135,7 @@ static void take_option(struct trace *t, int letter)
 		if (camera_parse_size(optarg, &t->width, &t->height))
 			cli_usage(c, "--size: '%s' is not a size such as 640x480", optarg);
 		break;
-	case 'd': diffuse_method(c, optarg); break;
+	case 'd': diffuse_method(t, optarg); break;
 	case OPT_EYE: t->has_eye = vector(c, "--eye", optarg, t->eye); break;
 	case OPT_TARGET: t->has_target = vector(c, "--target", optarg, t->target); break;
 	case OPT_UP: t->has_up = vector(c, "--up", optarg, t->up); break;
@@ -143,6 +150,7 @@ static void take_option(struct trace *t, int letter)
 		t->view.depth = (int)cli_integer(c, "--depth", optarg, 0, 100000);
 		break;
 	case OPT_CUTOFF: t->view.cutoff = cli_number(c, "--cutoff", optarg, 0, 1); break;
+	case OPT_MIX: t->mix = optarg; break;
 	case OPT_HALF: t->exr.half = 1; break;
 	case OPT_COMPRESSION: compression(t, optarg); break;
 	case OPT_LAYERS:
@@ -217,7 +225,7 @@ static void picture_key(const struct trace *t, struct shot *s)
 {
 	const struct view_options *v = &t->view;
 	const double number[] = { s->frame.width, s->frame.height, v->samples, v->lobe_samples,
-		v->depth, v->cutoff, v->layers, t->exr.compression, t->exr.half };
+		v->depth, v->cutoff, v->layers, t->method, t->exr.compression, t->exr.half };
 	char camera[33];
 	struct digest *d = digest_new();
 
@@ -226,6 +234,8 @@ static void picture_key(const struct trace *t, struct shot *s)
 	digest_string(d, t->content);
 	digest_string(d, camera);
 	digest_bytes(d, number, sizeof number);
+	if (t->mix)
+		digest_string(d, t->mix);
 	digest_end(d, s->key);
 }
 
@@ -293,18 +303,19 @@ static int plan(struct trace *t, struct err *e)
 static int read_scene(struct trace *t, int argc, char **argv, struct err *e)
 {
 	double begun = cli_seconds();
+	struct err why = { 0 };
 
 	if (rad_file_read(t->rad, &t->m, &t->s, &t->info, e))
 		return -1;
+	if (t->mix && light_groups_mix(&t->s, &t->m, t->mix, &why))
+		return err_set(e, "%s: --mix: %s", t->rad, why.text);
 	t->history = history_append(t->info.history, argc, argv, e);
 	double read = cli_seconds();
 	t->rays = ray_scene_new(&t->m, e);
 	if (!t->history || !t->rays)
 		return -1;
 	double built = cli_seconds();
-	if (reconstruct(&t->m, &t->s, PART_ALL, t->view.threads, &t->h, e))
-		return -1;
-	t->scene = view_scene_new(&t->m, t->rays, &t->h, e);
+	t->scene = view_scene_new(&t->m, &t->s, t->rays, t->method, t->view.threads, e);
 	double ready = cli_seconds();
 	snprintf(t->ready, sizeof t->ready, "%s: %zu triangles, %zu elements, %d band%s; read "
 	         "in %.3f s, ray structure in %.3f s, interpolation in %.3f s", t->rad,
@@ -421,7 +432,6 @@ static void release(struct trace *t)
 	free(t->history);
 	view_scene_free(t->scene);
 	ray_scene_free(t->rays);
-	reconstruction_free(&t->h);
 	solution_free(&t->s);
 	model_free(&t->m);
 	model_free(&t->cameras_of);

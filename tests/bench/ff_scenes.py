@@ -7,11 +7,13 @@
               3 x 3 a side; 8 floor squares that they hide are left out: 480 patches
   room-turned the same room whole, in whose air hang two turned boxes of six faces, 2 x 4
               each: 480 patches
+  ball        the same room, 3 x 3 a face and without the boxes, and in it a ball of 320 facets:
+              curved patches, and hidden pairs of plane ones
   city100, city370, city2100
               blocks of different heights on a ground in a box of sky: 100, 369 and 2105
               patches. The ground is cut along the blocks' walls; there is none under them
 
-All patches are one-sided and rectangular, each a node of its own name, and all can be
+All patches but the ball are one-sided and rectangular, each a node of its own name, and all can be
 seen; no two cross. Every scene is closed: whatever leaves a patch arrives at another. The
 same bytes every time. Written for `mesh -p inf -e inf`."""
 import os
@@ -23,7 +25,7 @@ import numpy as np
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "scenes"))
-from gltf_writer import Scene
+from gltf_writer import Scene, Shape
 
 # A face of the unit cube by its first corner and two sides, in front from inside.
 INSIDE = {"x": ((0, 0, 0), (0, 1, 0), (0, 0, 1)), "X": ((1, 0, 0), (0, 0, 1), (0, 1, 0)),
@@ -98,6 +100,13 @@ def room_turned():
     return p
 
 
+def ball():
+    p = Patches("room with a ball in it")
+    p.box("room", (0, 0, 0), (4, 4, 3), {face: (3, 3) for face in INSIDE}, True)
+    p.scene.shape("ball", Shape().sphere((2.2, 1.7, 1.4), .8, 2), p.material)
+    return p
+
+
 def city(blocks, columns, storeys, roof, sky_walls, sky_top, seed=1):
     """blocks x blocks of them, walls columns x storeys patches, roofs roof x roof."""
     p, dice = Patches(f"city of {blocks} x {blocks} blocks"), random.Random(seed)
@@ -119,7 +128,7 @@ def city(blocks, columns, storeys, roof, sky_walls, sky_top, seed=1):
     return p
 
 
-SCENES = {"room": room, "room-turned": room_turned,
+SCENES = {"room": room, "room-turned": room_turned, "ball": ball,
           "city100": lambda: city(3, 1, 1, 1, (3, 1), (3, 1)),
           "city370": lambda: city(5, 1, 2, 1, (4, 2), (4, 4)),
           "city2100": lambda: city(10, 2, 2, 1, (4, 3), (4, 4))}

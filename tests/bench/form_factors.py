@@ -32,7 +32,7 @@ import numpy as np
 sys.dont_write_bytecode = True
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [HERE, os.path.join(HERE, "..")]
-from chain import BUILD, Failed, container, run
+from chain import BUILD, Failed, container, form_factors, run
 from cube_factors import cube_factors
 from ff_scenes import make
 
@@ -156,7 +156,7 @@ def row(scene, options, repeat):
                              scene.mesh, "-o", ff))
         ratios.append(runs[-1].user / scene.bare())
     median = lambda what: statistics.median(getattr(r, what) for r in runs)
-    _, arrays = container(ff)
+    _, arrays = form_factors(ff)
     factors, judged = arrays["value"].size, [""] * 4
     if scene.patches <= MOST:
         got = np.load(matrix_file(ff))[:, :scene.patches]

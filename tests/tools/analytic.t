@@ -47,6 +47,88 @@ assert worst <= 4e-15, f"reciprocity is off by {worst}"
 END
 check "reciprocal to rounding" "$PYTHON" "$T/reciprocal.py" "$T/a.mesh" "$T/one.ff" "$T/0.csv"
 
+# What a factor costs in the file: 4 bytes are its value.
+cat >"$T/bytes.py" <<'END'
+import os, sys
+from chain import container
+cost = os.path.getsize(sys.argv[1]) / container(sys.argv[1])[1]["value"].size
+print(f"{cost:.3f} bytes a factor")
+assert cost <= float(sys.argv[2])
+END
+costs() {
+	prepare "$PYTHON" "$top/tests/bench/ff_scenes.py" "$1" "$T/c.gltf"
+	prepare mesh -p inf -e inf "$T/c.gltf" -o "$T/c.mesh"
+	prepare ffcalc --to patches -t "$3" "$T/c.mesh" -o "$T/c.ff"
+	check "$1: at most $2 bytes a factor" "$PYTHON" "$T/bytes.py" "$T/c.ff" "$2"
+	check "$1: rows close, factors are reciprocal" inspect --verify "$T/c.ff"
+}
+costs cube12 4.2 1e-6
+costs city100 8 1e-4
+
+# A row of spans that others share, as inspect and the program in ff(5) read it.
+prepare "$PYTHON" "$top/tests/bench/ff_scenes.py" cube6 "$T/c.gltf"
+prepare mesh -p inf -e inf "$T/c.gltf" -o "$T/c.mesh"
+prepare ffcalc --to patches "$T/c.mesh" -o "$T/c.ff"
+for row in 0 100 215; do
+	check "row $row: what the reader of ff(5) prints" sh -c "
+	inspect --npy patch-matrix '$T/c.ff' >'$T/c.npy'
+	$PYTHON '$top/tests/read_row.py' '$T/c.ff' $row >'$T/read' && $PYTHON -c '
+import sys, numpy as np
+lines = [line.split() for line in open(sys.argv[1])]
+row = np.zeros(216)
+row[[int(line[1]) for line in lines]] = [float(line[3]) for line in lines]
+assert len(lines) == 180 and (row == np.load(sys.argv[2])[$row, :216]).all()' '$T/read' '$T/c.npy'"
+done
+
+# A curved patch among plane ones: pairs of these stay reciprocal to rounding, and all is
+# as rays of another run say, at 4.5 standard errors for each receiver.
+prepare "$PYTHON" "$top/tests/bench/ff_scenes.py" ball "$T/ball.gltf"
+prepare mesh -p inf -e inf --normal-cone 40 "$T/ball.gltf" -o "$T/ball.mesh"
+ffcalc --to patches --precision f64 -t 1e-4 "$T/ball.mesh" -o "$T/ball.ff" >"$T/said" 2>&1
+check "says that pairs with a curved patch are by rays" \
+	grep -q '^by rays  *pairs with 1 of 55 patch-sides: they are curved$' "$T/said"
+prepare ffcalc --to patches -m rays -n 65536 --seed 2 "$T/ball.mesh" -o "$T/rays.ff"
+for name in ball rays; do
+	prepare sh -c "inspect --npy patch-matrix '$T/$name.ff' >'$T/$name.npy'"
+done
+cat >"$T/ball.py" <<'END'
+import json, sys
+import numpy as np
+from chain import form_factors
+f, g = (np.load(sys.argv[1] + name)[:, :-1] for name in ("/ball.npy", "/rays.npy"))
+meta, a = form_factors(sys.argv[1] + "/ball.ff")
+names = [json.loads(meta["surfaces"])[s] for s in a["patch_surface"]]
+plane = [i for i, name in enumerate(names) if name != "ball"]
+assert len(plane) == len(names) - 1
+exchange = (a["patch_area"] / a["row_scale"])[:, None] * f
+e = exchange[np.ix_(plane, plane)]
+assert abs(e - e.T).max() <= 1e-15 * e.max(), "not reciprocal"
+assert abs(f.sum(1) - 1).max() < 1e-12, "not closed"
+# The variance of one receiver's share of independent rays bounds that of stratified ones.
+error = np.sqrt(g * (1 - g) * (1 / 65536 + 1 / 4096)) + 1 / 4096
+assert (abs(f - g) <= 4.5 * error + 1e-4).all(), abs(f - g).max()
+_, r = form_factors(sys.argv[1] + "/rays.ff")
+stated = np.hypot(a["row_error"], r["row_error"])
+off = np.sqrt(((f - g) ** 2).sum(1)) / stated
+assert np.sqrt((off ** 2).mean()) < 1.5, f"rows are off by {off.mean():.2f} stated errors"
+END
+check "a curved patch: plane pairs reciprocal, rows closed, as rays say" "$PYTHON" "$T/ball.py" "$T"
+check "a curved patch: inspect --verify" inspect --verify "$T/ball.ff"
+prepare ffcalc --to patches --precision f64 -t 1e-4 -j 1 "$T/ball.mesh" -o "$T/one.ff"
+check "a curved patch: -j 1 as -j 2" cmp "$T/one.ff" "$T/ball.ff"
+
+# To elements: rows by formula trust their own sum, also where rays miss the receiver.
+cat >"$T/elements.py" <<'END'
+import sys
+lines = [line.split() for line in sys.stdin]
+assert len(lines) == 7, lines
+for case, _, expected, got, *_ in lines[1:]:
+    assert abs(float(got) - float(expected)) <= 1e-8 * float(expected), (case, expected, got)
+END
+check "to elements: six pairs to 1e-8" sh -c "
+$PYTHON '$top/tests/form_factors.py' -m analytic -o '-n 1024' par_C11_1 par_C13_3 tri_vertex \
+	tri_edge_179deg touching5 far3 | $PYTHON '$T/elements.py'"
+
 # says SCENE OPTIONS PATTERN NAME: the report has a line like the pattern.
 says() {
 	prepare mesh "$scenes/$1.gltf" -o "$T/b.mesh" -p 25% -e 25%
@@ -54,7 +136,7 @@ says() {
 	ffcalc -m analytic $2 -n 64 "$T/b.mesh" -o "$T/b.ff" >"$T/said" 2>&1
 	check "$4" grep -q "$3" "$T/said"
 }
-says two-pass "-t .1" '^by rays  *1 of 254 patch-sides are curved$' 'says how many patch-sides are curved'
+says two-pass "-t .1" '^by rays  *light from 1 of 254 patch-sides: they are curved$' 'says how many patch-sides are curved'
 says two-pass "--to patches -t .1" '^by rays .*: there are lobes, mirrors or panes$' 'says that lobes need rays'
 says mirror-image "--to patches" '^by rays .*: there are lobes, mirrors or panes$' 'says that mirrors need rays'
 says cornell "" '^pairs .* sampled$' 'a few rays do as well'

@@ -8,7 +8,7 @@
 rows_close() {
 	$PYTHON -c '
 import sys, chain, numpy as np
-_, a = chain.container(sys.argv[1])
+_, a = chain.form_factors(sys.argv[1])
 first = a["row_block"][:-1].astype(int)
 start = a["block_start"].astype(int)
 values = a["value"] if "value" in a else a["value64"]
@@ -27,7 +27,7 @@ ledger_closes() {
 	$PYTHON -c '
 import sys, chain, numpy as np
 _, a = chain.container(sys.argv[1])
-emitted, *gone = a["ledger"]
+emitted, *gone = (x.ravel() for x in a["ledger"])
 unshot = sum(a[n].reshape(-1, len(emitted)).sum(0)
              for n in ("unshot_emission", "unshot_diffuse", "unshot_link") if a[n].size)
 residual = np.abs(emitted - sum(gone) - unshot) / emitted.max()

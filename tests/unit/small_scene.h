@@ -110,7 +110,7 @@ static inline void small_ff(struct ff *f)
 	const uint8_t kind[] = { FF_DIFFUSE, FF_DIFFUSE, FF_DIFFUSE, FF_REFLECTED };
 	const float value[] = { .25f, .25f, .125f, .125f, .125f, .125f, .5f }, up[] = { 0, 0, 1 };
 	const double scale[] = { 1, 1, 1, 2 }, none[] = { 0, 0, 0, 0, 0 };
-	const double error[] = { .01, 0, .02, 0 }, residual[] = { 1e-7, 0, 0, 0 };
+	const float error[] = { .01f, 0, .02f, 0 }, residual[] = { 1e-7f, 0, 0, 0 };
 	const double escape[] = { .375, 0, 1, .5, 0 }, black[] = { .125, .125, 0, .125, 0 };
 	const uint32_t target[] = { 0 }, source[] = { 2 }, chain[] = { 0 }, rows[] = { 3, FF_NO_ROW };
 
@@ -143,7 +143,10 @@ static inline void small_solution(struct solution *s, const struct model *m)
 {
 	const size_t bands = (size_t)m->bands, sides = 2 * m->elements, patch_sides = 2 * m->patches;
 
-	*s = (struct solution){ .groups = 1, .element_sides = sides, .bands = m->bands,
+	*s = (struct solution){ .groups = 1, .emitters = m->material.n,
+		.emitter_group = calloc(m->material.n, sizeof *s->emitter_group),
+		.group_name = calloc(1, sizeof *s->group_name),
+		.element_sides = sides, .bands = m->bands,
 		.patch_sides = patch_sides, .links = 1, .shots = 42,
 		.direct = ramp(sides * bands, .5), .caustic = ramp(sides * bands, .25),
 		.indirect = ramp(sides * bands, .125), .error = ramp(sides * bands, .01),
@@ -153,6 +156,7 @@ static inline void small_solution(struct solution *s, const struct model *m)
 		.unshot_diffuse = ramp(patch_sides * bands, 1e-3),
 		.unshot_link = ramp(2 * bands, 1e-3),
 		.ledger = ramp(LEDGER_TERMS * bands, 0) };
+	s->group_name[0] = strdup("all");
 	for (size_t b = 0; b < bands; b++) {
 		double unshot = 0;
 		for (size_t i = 0; i < patch_sides; i++)

@@ -205,11 +205,11 @@ static void test_ff(void **state)
 	assert_int_equal(f.f.rows, ff.rows);
 	SAME(f.f.row_block, ff.row_block, 5);
 	SAME(f.f.block_start, ff.block_start, 6);
-	const uint64_t words[] = { 0, 2, 3, 3, 5, 6 };
-	const uint32_t column[] = { 1, 4, 4, 0, 3, 4 }; /* the fourth block is a span */
-	SAME(f.f.block_column, words, 6);
-	SAME(f.f.column, column, 6);
-	assert_true(f.f.columns == 6 && !f.f.to_patches);
+	const uint64_t words[] = { 2 * 0, 2 * 2, 2 * 3, 2 * 3 + 1, 2 * 5 };
+	const uint16_t column[] = { 1, 4, 4, 0, 3, 4 }; /* the fourth block is a span */
+	SAME(f.f.block_column, words, 5);
+	SAME(f.f.column16, column, 6);
+	assert_true(f.f.columns == 6 && !f.f.to_patches && !f.f.column);
 	assert_true(ff_has_spans(&f.f, 3) && !ff_has_spans(&f.f, 0));
 	SAME(f.f.value, ff.value, 7);
 	assert_null(f.f.value64);
@@ -485,19 +485,19 @@ static void test_forged_form_factors(void **state)
 {
 	(void)state;
 	FORGE("block_start", 1, uint64_t, 1000, "array block_start");
-	FORGE("block_start", 4, uint64_t, 5, "array value: row 2 sums to 0.875 instead of 1");
-	FORGE("block_column", 1, uint64_t, 3, "array block_column: block 0 has more columns than");
-	FORGE("block_column", 2, uint64_t, 1, "array block_column: values 1 and 2 do not ascend");
-	FORGE("block_column", 4, uint64_t, 4, "array block_column: block 3 has an odd number");
-	FORGE("block_column", 5, uint64_t, 7, "array block_column: it runs from 0 to 7");
-	FORGE("column", 3, uint32_t, 6, "array column: value 3 is 6, which must be below 6");
-	FORGE("column", 3, uint32_t, 2, "array column: value 4 is 3, with which 3 columns end beyond");
-	FORGE("column", 4, uint32_t, 0, "array column: value 4 is 0 and counts columns");
-	FORGE("column", 4, uint32_t, UINT32_MAX, "array column: value 4 is 4294967295, with which");
-	FORGE("column", 4, uint32_t, 2, "array column: block 3 has 1 values too many");
+	FORGE("block_start", 4, uint64_t, 5, "array column: value 4 is 3, with which block 3 has more");
+	FORGE("block_column", 0, uint64_t, 2 * 5, "array block_column: block 0 ends beyond the last");
+	FORGE("block_column", 1, uint64_t, 2 * 7, "array block_column: block 1 begins beyond the last");
+	FORGE("block_column", 3, uint64_t, 2 * 5 + 1, "array block_column: block 3 ends beyond the last");
+	FORGE("block_column", 4, uint64_t, UINT64_MAX, "array block_column: block 4 begins beyond");
+	FORGE("column", 3, uint16_t, 6, "array column: value 3 is 6, which must be below 6");
+	FORGE("column", 3, uint16_t, 2, "array column: value 4 is 3, with which 3 columns end beyond");
+	FORGE("column", 4, uint16_t, 0, "array column: value 4 is 0 and counts columns");
+	FORGE("column", 4, uint16_t, UINT16_MAX, "array column: value 4 is 65535, with which");
+	FORGE("column", 4, uint16_t, 2, "array block_column: block 3 ends beyond the last column");
 	refuse_forged("receivers", 0, "walls", 0, "metadata receivers: walls, neither elements");
 	refuse_forged("receivers", 0, "patches", 0, "array column: value 1 is 4, which must be below 4");
-	refuse_forged("version", 0, "1", 0, "version 1, this program knows version 2");
+	refuse_forged("version", 0, "1", 0, "version 1, this program knows version 3");
 }
 
 static void refuse_ff(void *where, const void *value, size_t bytes, const char *message)
@@ -529,8 +529,8 @@ static void test_refused_form_factors(void **state)
 	REFUSE(ff.column[1], uint32_t, 1, "array column: value 1 is out of order");
 	REFUSE(ff.column[1], uint32_t, 0, "array column: value 1 is out of order");
 	REFUSE(ff.row_scale[3], double, 0, "array row_scale: value 3 is 0");
-	REFUSE(ff.row_error[0], double, -1, "array row_error");
-	REFUSE(ff.row_residual[0], double, (double)NAN, "array row_residual");
+	REFUSE(ff.row_error[0], float, -1, "array row_error");
+	REFUSE(ff.row_residual[0], float, (float)NAN, "array row_residual");
 	REFUSE(ff.row_side[1], uint32_t, 4, "array row_side: row 1 leaves patch 2");
 	REFUSE(ff.row_kind[1], uint8_t, 4, "array row_kind: value 1 is 4");
 	REFUSE(ff.row_block[1], uint64_t, 0, "array row_block");

@@ -12,6 +12,7 @@
 #include "../../formats/ff_file.h"
 #include "../../lib/bsdf.h"
 #include "../../lib/radiosity.h"
+#include "../../lib/solver.h"
 #include "grid.h"
 #include "memory_ff.h"
 
@@ -43,7 +44,7 @@ static void solution_of(const struct model *m, const struct ff *f, struct soluti
 	struct radiosity_report r;
 
 	assert_int_equal(transport_init(&t, m, shard, name, 1, 2, &e), 0);
-	assert_int_equal(solution_begin(s, m, &t, &e), 0);
+	assert_int_equal(solution_begin(s, m, &t, 0, &e), 0);
 	if (radiosity_shoot(s, &t, &ro, NULL, &r, &e)) {
 		print_error("%s\n", e.text);
 		fail();
@@ -316,13 +317,142 @@ static void white_box_has_no_steady_state(void **state)
 	grid_end(&m);
 	memory_ff(&m, &rays, &f, &stats);
 	assert_int_equal(transport_init(&t, &m, shard, name, 1, 2, &e), 0);
-	assert_int_equal(solution_begin(&s, &m, &t, &e), 0);
+	assert_int_equal(solution_begin(&s, &m, &t, 0, &e), 0);
 	assert_int_equal(radiosity_shoot(&s, &t, &ro, NULL, &r, &e), -1);
 	assert_non_null(strstr(e.text, "no steady state"));
 	transport_free(&t);
 	solution_free(&s);
 	ff_free(&f);
 	model_free(&m);
+}
+
+/* A box of albedo rho where everything emits 1: H = 1 / (1 - rho) everywhere. */
+static void white_furnace(double rho, double passes)
+{
+	struct model m;
+	struct ff f;
+	struct ff_stats stats;
+	struct transport t;
+	struct solution s;
+	struct err e = { 0 };
+	const uint32_t material[6] = { 0 };
+	const struct ff *shard[] = { &f };
+	const char *name[] = { "memory" };
+	struct radiosity_options o = { 1e-8, UINT64_MAX, 2 };
+	struct radiosity_report r;
+	double exact = 1 / (1 - rho);
+
+	grid_new(&m, 6, 4, 1, 1);
+	grid_box(&m, 4, material, zero, one);
+	set_diffuse(&m, 0, rho, 1);
+	grid_end(&m);
+	memory_ff(&m, &rays, &f, &stats);
+	assert_int_equal(transport_init(&t, &m, shard, name, 1, 2, &e), 0);
+	assert_int_equal(solution_begin(&s, &m, &t, 0, &e), 0);
+	assert_int_equal(radiosity_shoot(&s, &t, &o, NULL, &r, &e), 0);
+	assert_int_equal(radiosity_gather(&s, &t, 2, &r, &e), 0);
+	double absorbed = (1 - rho) * s.ledger[0] * exact;
+	assert_true(fabs(s.ledger[LEDGER_ABSORBED] / absorbed - 1) < r.bound);
+	assert_true(r.bound < 1e-7 * exact);
+	assert_true(r.passes <= passes);
+	assert_true(r.residual <= 1e-12);
+	for (size_t p = 0; p < m.patches; p++) {
+		double h = 0;
+		for (uint32_t i = m.patch_start[p]; i < m.patch_start[p + 1]; i++)
+			h += solution_irradiance(&s, 2 * i, 0) * m.element_area[i] / m.patch_area[p];
+		assert_true(fabs(h / exact - 1) < .05);
+	}
+	solution_free(&s);
+	transport_free(&t);
+	ff_free(&f);
+	model_free(&m);
+}
+
+static void white_furnaces(void **state)
+{
+	(void)state;
+	white_furnace(.99, 100);
+	white_furnace(.999, 100);
+	white_furnace(.9999, 100);
+}
+
+/* Shooting every side by turns until nothing is left, with plain shots alone. */
+static void shoot_all(struct solver *v)
+{
+	double worst = 1;
+
+	for (int i = 0; i < 100000 && worst > 1e-13; i++) {
+		for (uint32_t ps = 0; ps < v->s->patch_sides; ps++)
+			solver_shoot(v, ps);
+		solver_survey(v, &worst);
+	}
+	assert_true(worst <= 1e-13);
+}
+
+static void assert_near(const double *a, const double *b, size_t n)
+{
+	double most = 0, off = 0;
+
+	for (size_t i = 0; i < n; i++) {
+		most = fmax(most, fabs(a[i]));
+		off = fmax(off, fabs(a[i] - b[i]));
+	}
+	assert_true(off <= 1e-10 * most);
+}
+
+/* Overshooting comes to what shots come to, in each of the three parts: mirrors, lobes,
+ * transmission. */
+static void overshooting(double exponent, int bands)
+{
+	struct model m;
+	struct ff f;
+	struct ff_stats stats;
+	struct transport t;
+	struct solution s[2];
+	struct err e = { 0 };
+	const struct ff *shard[] = { &f };
+	const char *name[] = { "memory" };
+	struct ff_options o = rays;
+	struct radiosity_report r;
+
+	o.rays = o.lobe_rays = 512;
+	plates_model(&m, exponent, bands);
+	memory_ff(&m, &o, &f, &stats);
+	assert_int_equal(transport_init(&t, &m, shard, name, 1, 2, &e), 0);
+	for (int k = 0; k < 2; k++) {
+		struct solver v;
+		double worst;
+		assert_int_equal(solution_begin(&s[k], &m, &t, 0, &e), 0);
+		assert_int_equal(solver_init(&v, &s[k], &t, &e), 0);
+		solver_survey(&v, &worst);
+		if (k == 0)
+			shoot_all(&v);
+		for (int i = 0; k == 1 && i < 3; i++)
+			assert_true(solver_overshoot(&v, 1, 1e-13, &e) >= 0);
+		solver_survey(&v, &worst);
+		assert_true(worst <= 1e-12);
+		assert_true(v.residual <= 1e-12);
+		sender_store(&v.sender, &s[k]);
+		solver_free(&v);
+		assert_int_equal(radiosity_gather(&s[k], &t, 2, &r, &e), 0);
+	}
+	size_t n = s[0].element_sides * (size_t)bands;
+	assert_near(s[0].direct, s[1].direct, n);
+	assert_near(s[0].caustic, s[1].caustic, n);
+	assert_near(s[0].indirect, s[1].indirect, n);
+	for (int k = 0; k < 2; k++)
+		solution_free(&s[k]);
+	transport_free(&t);
+	ff_free(&f);
+	model_free(&m);
+}
+
+static void overshooting_as_shots(void **state)
+{
+	(void)state;
+	overshooting(20, 1);
+	overshooting(20, 6);
+	overshooting((double)INFINITY, 3);
 }
 
 int main(void)
@@ -337,6 +467,8 @@ int main(void)
 		cmocka_unit_test(patches_as_receivers_f64),
 		cmocka_unit_test(shards_of_two_kinds),
 		cmocka_unit_test(white_box_has_no_steady_state),
+		cmocka_unit_test(white_furnaces),
+		cmocka_unit_test(overshooting_as_shots),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -103,13 +103,14 @@ static void exchange(double f01, double f10, double error, struct verify *v)
 {
 	uint32_t start[] = { 0, 1, 2 }, side[] = { 0, 2 }, samples[] = { 1, 1 }, chain[] = { 0, 0 };
 	uint32_t column[] = { 2, 0 };
-	double area[] = { 1, 2 }, scale[] = { 1, 1 }, zero[] = { 0, 0 }, errors[] = { error, error };
+	double area[] = { 1, 2 }, scale[] = { 1, 1 }, zero[] = { 0, 0 };
+	float errors[] = { (float)error, (float)error }, nought[] = { 0, 0 };
 	double value[] = { f01, f10 }, escape[] = { 1 - f01, 1 - f10 };
 	uint64_t row_block[] = { 0, 1, 2 }, block_start[] = { 0, 1, 2 }, arrival[] = { 0, 0, 0 };
 	uint64_t chain_start[] = { 0, 0 };
 	uint8_t kind[] = { FF_DIFFUSE, FF_DIFFUSE }, front[] = { 1, 1 };
 	const struct ff f = { .chains = 1, .chain_start = chain_start, .rows = 2, .row_side = side,
-		.row_kind = kind, .row_samples = samples, .row_scale = scale, .row_residual = zero,
+		.row_kind = kind, .row_samples = samples, .row_scale = scale, .row_residual = nought,
 		.row_error = errors, .row_block = row_block, .blocks = 2, .block_chain = chain,
 		.block_start = block_start, .block_escape = escape, .block_black = zero,
 		.block_lost = zero, .block_cut = zero, .block_arrival = arrival, .entries = 2,
@@ -196,12 +197,12 @@ static void spans(uint32_t first0, uint32_t count0, uint32_t first1, uint32_t co
 	uint32_t start[] = { 0, 8 }, side[] = { 0 }, samples[] = { 1 }, chain[] = { 0 };
 	uint32_t column[] = { first0, count0, first1, count1 };
 	double area[] = { 1 }, one[] = { 1 }, zero[] = { 0 };
-	float value[8] = { .125f, .125f, .125f, .125f, .125f, .125f, .125f, .125f };
-	uint64_t row_block[] = { 0, 1 }, entries[] = { 0, 8 }, words[] = { 0, 4 }, none[] = { 0, 0 };
+	float value[8] = { .125f, .125f, .125f, .125f, .125f, .125f, .125f, .125f }, nought[] = { 0 };
+	uint64_t row_block[] = { 0, 1 }, entries[] = { 0, 8 }, words[] = { 1 }, none[] = { 0, 0 };
 	uint8_t kind[] = { FF_DIFFUSE }, sides2[] = { 3 };
 	const struct ff f = { .chains = 1, .chain_start = none, .rows = 1, .row_side = side,
-		.row_kind = kind, .row_samples = samples, .row_scale = one, .row_residual = zero,
-		.row_error = zero, .row_block = row_block, .blocks = 1, .block_chain = chain,
+		.row_kind = kind, .row_samples = samples, .row_scale = one, .row_residual = nought,
+		.row_error = nought, .row_block = row_block, .blocks = 1, .block_chain = chain,
 		.block_start = entries, .block_column = words, .block_escape = zero,
 		.block_black = zero, .block_lost = zero, .block_cut = zero, .block_arrival = none,
 		.entries = 8, .columns = 4, .column = column, .value = value, .patch_end = 1,
@@ -227,7 +228,7 @@ static void test_spans(void **state)
 	spans(0, 4, 8, 5, "array column: value 3 is 5, with which 5 columns end beyond 16");
 	spans(0, 4, 8, UINT32_MAX, "array column: value 3 is 4294967295, with which");
 	spans(0, 5, 1, 4, "array column: value 3 is 4, with which block 0 has more columns");
-	spans(0, 4, 8, 3, "array column: block 0 has 1 values too many");
+	spans(0, 4, 8, 3, "array block_column: block 0 ends beyond the last column");
 }
 
 int main(void)

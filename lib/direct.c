@@ -1,0 +1,402 @@
+#include "direct.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "contour.h"
+#include "cubature.h"
+#include "emitters.h"
+#include "facet_set.h"
+#include "rng.h"
+#include "seen.h"
+#include "vec3.h"
+
+#define PI 3.14159265358979323846
+
+enum {
+	EXACT_MOST = 48,     /* emitters: of more, all are sampled */
+	BLOCKERS_MOST = 16,  /* before one of them; beyond, rays cost less */
+	PARTS = 4            /* independent scrambles that a standard error comes from */
+};
+
+/* Shadow rays of a part: at first, and at most. */
+enum { RAYS_FIRST = 16, RAYS_MOST = 256 };
+
+struct direct {
+	const struct model *m;
+	const struct ray_scene *rays;
+	double centre[3];
+	struct emitters emitters;
+	struct body_set bodies;
+	int exact;                    /* emitters are looked at one by one */
+};
+
+/* What the side sees of an emitter. */
+struct outlook {
+	const struct emitter *emitter;
+	struct facet_room room;
+	const struct facet *f;        /* the part in front of the side's plane */
+	uint64_t blockers;            /* bits of the seer's that may hide something */
+	int sampled;
+};
+
+struct direct_worker {
+	const struct direct *d;
+	uint32_t element_side;        /* UINT32_MAX: none yet */
+	double normal[3];
+	struct outlook *outlook;      /* [emitters, or EXACT_MOST at most] */
+	size_t outlooks;
+	double *weight;               /* [emitters] cumulated, of sampled ones */
+	struct seer seer;
+	struct sight_line sight;
+	uint64_t rays;
+};
+
+/* ---- what all points share ---- */
+
+struct direct *direct_new(const struct model *m, const struct ray_scene *rays, struct err *e)
+{
+	struct direct *d = mem_new(1, sizeof *d, "direct light", e);
+
+	if (!d)
+		return NULL;
+	d->m = m;
+	d->rays = rays;
+	facet_centre(m, d->centre);
+	int bad = emitters_init(&d->emitters, m, e);
+	d->exact = d->emitters.n <= EXACT_MOST;
+	if (!bad && (!d->exact || !body_set_init(&d->bodies, m, e)))
+		return d;
+	direct_free(d);
+	return NULL;
+}
+
+void direct_free(struct direct *d)
+{
+	if (!d)
+		return;
+	emitters_free(&d->emitters);
+	body_set_free(&d->bodies);
+	free(d);
+}
+
+struct direct_worker *direct_worker_new(const struct direct *d, struct err *e)
+{
+	struct direct_worker *w = mem_new(1, sizeof *w, "direct light", e);
+
+	if (!w)
+		return NULL;
+	w->d = d;
+	w->element_side = UINT32_MAX;
+	w->outlook = mem_new(d->exact ? d->emitters.n : 0, sizeof *w->outlook, "direct light", e);
+	w->weight = mem_new(d->emitters.n, sizeof *w->weight, "direct light", e);
+	if (w->outlook && w->weight)
+		return w;
+	direct_worker_free(w);
+	return NULL;
+}
+
+void direct_worker_free(struct direct_worker *w)
+{
+	if (!w)
+		return;
+	seer_free(&w->seer);
+	free(w->outlook);
+	free(w->weight);
+	free(w);
+}
+
+uint64_t direct_rays(const struct direct_worker *w)
+{
+	return w->rays;
+}
+
+/* ---- what stands between a side and the emitters ---- */
+
+/* The part of a facet in front of another's plane, which may be in `room`; NULL if there
+ * is none. */
+static const struct facet *front_part(const struct facet *f, const struct facet *of, double near,
+                                      struct facet_room *room)
+{
+	double lowest, highest;
+
+	facet_heights(f, of->normal, of->offset, &lowest, &highest);
+	if (highest <= near)
+		return NULL;
+	if (lowest >= -near)
+		return f;
+	return facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
+}
+
+/* Puts the sight line's bodies behind those that the seer has. 0 if there is no room. */
+static int put_blockers(struct direct_worker *w, int *used, struct outlook *o)
+{
+	if (*used + w->sight.bodies > SIGHT_BLOCKERS)
+		return 0;
+	for (int i = 0; i < w->sight.bodies; i++)
+		if (blocker_make(&w->d->bodies, w->sight.body[i], o->f, &w->seer.blocker[*used]))
+			o->blockers |= (uint64_t)1 << (*used)++;
+	return 1;
+}
+
+/* What the element-side f sees of an emitter; 0 if nothing. */
+static int look(struct direct_worker *w, const struct facet *f, const struct emitter *t, int *used,
+                struct outlook *o)
+{
+	const struct direct *d = w->d;
+	struct facet_room room;
+	const struct facet *from = front_part(f, &t->f, d->bodies.near, &room);
+
+	o->emitter = t;
+	o->blockers = 0;
+	o->sampled = 0;
+	o->f = from ? front_part(&t->f, f, d->bodies.near, &o->room) : NULL;
+	if (!o->f)
+		return 0;
+	w->sight.most = BLOCKERS_MOST;
+	enum sight sight = sight_find(&w->sight, &d->bodies, from, o->f);
+	o->sampled = sight == SIGHT_CROWDED || (sight == SIGHT_PART && !put_blockers(w, used, o));
+	return sight != SIGHT_NONE;
+}
+
+/* The element as a facet whose front is the side. */
+static struct facet side_facet(const struct direct *d, uint32_t element_side, double corner[9])
+{
+	struct facet f = { .n = 3, .v = corner };
+	const uint32_t *c = &d->m->element[3 * (size_t)(element_side >> 1)];
+
+	for (int k = 0; k < 3; k++)
+		v3_sub(&d->m->vertex[3 * (size_t)c[element_side & 1 ? 2 - k : k]], d->centre,
+		       &corner[3 * k]);
+	facet_measure(&f);
+	return f;
+}
+
+void direct_begin(struct direct_worker *w, uint32_t element_side)
+{
+	const struct direct *d = w->d;
+	double corner[9];
+	int used = 0;
+
+	if (element_side == w->element_side)
+		return;
+	struct facet f = side_facet(d, element_side, corner);
+	w->element_side = element_side;
+	memcpy(w->normal, f.normal, sizeof w->normal);
+	w->outlooks = 0;
+	w->seer.near = d->bodies.near;
+	for (size_t i = 0; i < d->emitters.n && d->exact; i++)
+		w->outlooks += (size_t)look(w, &f, &d->emitters.emitter[i], &used,
+		                            &w->outlook[w->outlooks]);
+}
+
+/* ---- by formula ---- */
+
+/* Integral of cos^(m-1) cos' dw over a convex polygon seen whole from x, m the emitter's
+ * exponent and cos' at x: by cubature over parts that are small for their distance. */
+static double lobe_part(const struct direct_worker *w, const struct emitter *t, const double x[3],
+                        const struct facet *f, int depth)
+{
+	enum { DEEPEST = 6, ROOM = 36 * (FACET_CORNERS / 2) };
+	struct facet_room quarter[4];
+	double d[3], sum = 0;
+
+	v3_sub(f->centre, x, d);
+	if (depth < DEEPEST && v3_dot(d, d) < 9 * f->radius * f->radius && facet_quarter(f, quarter)) {
+		for (int i = 0; i < 4; i++)
+			sum += lobe_part(w, t, x, &quarter[i].f, depth + 1);
+		return sum;
+	}
+	double at[4][ROOM];
+	struct cubature p = { 0, at[0], at[1], at[2], at[3] };
+	cubature_fill(f, 2, &p);
+	for (int i = 0; i < p.n; i++) {
+		double y[3] = { p.x[i], p.y[i], p.z[i] };
+		v3_sub(y, x, d);
+		double r2 = v3_dot(d, d), r = sqrt(r2), here = v3_dot(d, w->normal) / r;
+		double there = -v3_dot(d, t->f.normal) / r;
+		if (p.w[i] > 0 && here > 0 && there > 0)
+			sum += p.w[i] * pow(there, t->exponent) * here / r2;
+	}
+	return sum;
+}
+
+/* The same over what is seen of the polygon: a fan of triangles for each piece. */
+static double lobe_pieces(const struct direct_worker *w, const struct emitter *t, const double x[3])
+{
+	size_t pieces;
+	const struct facet_piece *p = seen_pieces(&w->seer, &pieces);
+	double sum = 0;
+
+	for (size_t i = 0; i < pieces; i++)
+		for (int k = 1; k + 1 < p[i].n; k++) {
+			double corner[9];
+			struct facet f = { .n = 3, .v = corner };
+			memcpy(corner, p[i].v[0], 3 * sizeof *corner);
+			memcpy(corner + 3, p[i].v[k], 6 * sizeof *corner);
+			facet_measure(&f);
+			if (f.area > 0)
+				sum += lobe_part(w, t, x, &f, 0);
+		}
+	return sum;
+}
+
+/* Irradiance for unit radiance along the emitter's normal. NaN and e when memory is short. */
+static double exact(struct direct_worker *w, const struct outlook *o, const double x[3],
+                    struct err *e)
+{
+	const struct emitter *t = o->emitter;
+
+	if (v3_dot(t->f.normal, x) - t->f.offset <= 0)
+		return 0;
+	if (!o->blockers && t->exponent == 1)
+		return PI * fmax(0, contour_point(x, w->normal, o->f->n, o->f->v));
+	double f = seen(&w->seer, x, w->normal, o->f, o->blockers, e);
+	if (isnan(f))
+		return f;
+	return t->exponent == 1 ? PI * fmax(0, f) : lobe_pieces(w, t, x);
+}
+
+/* ---- by shadow rays ---- */
+
+/* About what an emitter would bring if nothing were hidden: the density that it is chosen
+ * with. 0 only if it is behind the plane of x, or x behind its plane. */
+static double guess(const struct direct_worker *w, const struct emitter *t, const double x[3])
+{
+	double d[3], lowest, highest, offset = v3_dot(w->normal, x);
+	double there = v3_dot(t->f.normal, x) - t->f.offset;
+
+	facet_heights(&t->f, w->normal, offset, &lowest, &highest);
+	if (highest <= 0 || there <= 0)
+		return 0;
+	v3_sub(t->f.centre, x, d);
+	double r2 = fmax(v3_dot(d, d), t->f.radius * t->f.radius), r = sqrt(r2);
+	return t->power * pow(fmin(1, there / r), t->exponent) * (highest / r) / r2;
+}
+
+/* A point of a convex facet. */
+static void point_on(const struct facet *f, double u, double v, double x[3])
+{
+	double sum = 0, area[FACET_CORNERS] = { 0 };
+	int i;
+
+	for (int k = 1; k + 1 < f->n; k++) {
+		double n[3];
+		v3_area(f->v, &f->v[3 * k], &f->v[3 * (k + 1)], n);
+		sum += area[k] = v3_length(n);
+	}
+	for (i = 1, u *= sum; i + 2 < f->n && u >= area[i]; i++)
+		u -= area[i];
+	double r = sqrt(fmin(1, u / area[i]));
+	for (int k = 0; k < 3; k++)
+		x[k] = (1 - r) * f->v[k] + r * ((1 - v) * f->v[3 * i + k] + v * f->v[3 * i + 3 + k]);
+}
+
+/* 1 if nothing is between points x and y of the side and of an emitter. */
+static int clear_line(struct direct_worker *w, const double x[3], const double y[3],
+                      const struct emitter *t)
+{
+	double from[3], to[3];
+
+	v3_mad(x, 1, w->d->centre, from);
+	v3_mad(y, 1, w->d->centre, to);
+	ray_leave(w->d->rays, w->normal, from);
+	ray_leave(w->d->rays, t->f.normal, to);
+	w->rays++;
+	return !ray_blocked(w->d->rays, from, to);
+}
+
+/* Adds what one shadow ray brings to h. */
+static void add_ray(struct direct_worker *w, const double x[3], size_t n, const double u[3],
+                    double *h)
+{
+	const struct direct *d = w->d;
+	double total = w->weight[n - 1], at = u[0] * total, y[3], v[3];
+	size_t lo = 0;
+
+	for (size_t left = n; left > 1;) {
+		size_t half = left / 2;
+		lo += w->weight[lo + half - 1] <= at ? half : 0;
+		left -= half;
+	}
+	const struct emitter *t = d->exact ? w->outlook[lo].emitter : &d->emitters.emitter[lo];
+	double share = (w->weight[lo] - (lo ? w->weight[lo - 1] : 0)) / total;
+	point_on(&t->f, u[1], u[2], y);
+	v3_sub(y, x, v);
+	double r2 = v3_dot(v, v), r = sqrt(r2);
+	double here = v3_dot(v, w->normal) / r, there = -v3_dot(v, t->f.normal) / r;
+	if (!(here > 0 && there > 0 && share > 0) || !clear_line(w, x, y, t))
+		return;
+	double scale = here * pow(there, t->exponent) / r2 * t->f.area / share;
+	for (int b = 0; b < d->m->bands; b++)
+		h[b] += scale * t->radiance[b];
+}
+
+/* Mean of the parts, its standard error, and whether that is small enough. */
+static int settled(double part[PARTS][BANDS_MAX], int bands, double rays, double relative, double *h,
+                   double *error)
+{
+	int good = 1;
+
+	for (int b = 0; b < bands; b++) {
+		double mean = 0, square = 0;
+		for (int p = 0; p < PARTS; p++)
+			mean += part[p][b] / PARTS;
+		for (int p = 0; p < PARTS; p++)
+			square += (part[p][b] - mean) * (part[p][b] - mean);
+		h[b] = mean / rays;
+		error[b] = sqrt(square / (PARTS * (PARTS - 1))) / rays;
+		good &= error[b] <= relative * h[b];
+	}
+	return good;
+}
+
+/* What the first n emitters bring, or outlooks, by their cumulated weights. */
+static void sample(struct direct_worker *w, const double x[3], size_t n, uint64_t seed,
+                   double relative, double *h, double *error)
+{
+	double part[PARTS][BANDS_MAX] = { { 0 } }, u[3];
+	uint32_t from = 0;
+
+	for (uint32_t to = RAYS_FIRST; to <= RAYS_MOST; from = to, to *= 2) {
+		for (int p = 0; p < PARTS; p++)
+			for (uint32_t i = from; i < to; i++) {
+				for (int k = 0; k < 3; k++)
+					u[k] = rng_sobol(i, k, seed + (uint64_t)p);
+				add_ray(w, x, n, u, part[p]);
+			}
+		if (settled(part, w->d->m->bands, to, relative, h, error))
+			return;
+	}
+}
+
+int direct_at(struct direct_worker *w, const double world[3], uint64_t seed, double relative,
+              double *h, double *error, struct err *e)
+{
+	const struct direct *d = w->d;
+	size_t n = d->exact ? w->outlooks : d->emitters.n;
+	double x[3], sum = 0;
+
+	v3_sub(world, d->centre, x);
+	memset(h, 0, (size_t)d->m->bands * sizeof *h);
+	memset(error, 0, (size_t)d->m->bands * sizeof *error);
+	for (size_t i = 0; i < n; i++) {
+		const struct emitter *t = d->exact ? w->outlook[i].emitter : &d->emitters.emitter[i];
+		if (!d->exact || w->outlook[i].sampled)
+			sum += guess(w, t, x);
+		w->weight[i] = sum;
+	}
+	if (sum > 0)
+		sample(w, x, n, seed, relative, h, error);
+	for (size_t i = 0; i < n && d->exact; i++) {
+		if (w->outlook[i].sampled)
+			continue;
+		double f = exact(w, &w->outlook[i], x, e);
+		if (isnan(f))
+			return -1;
+		for (int b = 0; b < d->m->bands; b++)
+			h[b] += f * w->outlook[i].emitter->radiance[b];
+	}
+	return 0;
+}

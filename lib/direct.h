@@ -1,0 +1,45 @@
+/* Irradiance that comes straight from emitters, at points where a picture needs it.
+ *
+ * What a point sees of an emitter's polygon past the convex bodies between is found by
+ * clipping, and its irradiance by Lambert's formula: exact, without noise. Emitters that
+ * more bodies stand before than that pays for, and scenes of many emitters, are sampled
+ * by shadow rays instead, which come with a standard error. Light through mirrors and
+ * panes is not direct: everything hides what is behind it. */
+#ifndef TWOPASS_DIRECT_H
+#define TWOPASS_DIRECT_H
+
+#include <stdint.h>
+
+#include "err.h"
+#include "model.h"
+#include "ray.h"
+
+/* What all points share. Read-only once made. */
+struct direct;
+
+/* One thread's scratch space, and what stands between one element-side and the emitters. */
+struct direct_worker;
+
+/* m and rays must outlive it. O(triangles log triangles). NULL and e on failure. */
+struct direct *direct_new(const struct model *m, const struct ray_scene *rays, struct err *e);
+void direct_free(struct direct *d);
+
+struct direct_worker *direct_worker_new(const struct direct *d, struct err *e);
+void direct_worker_free(struct direct_worker *w);
+
+/* Makes the side the one that the points of direct_at are on; free if it already was.
+ * O(emitters x bodies near the lines between). */
+void direct_begin(struct direct_worker *w, uint32_t element_side);
+
+/* Irradiance of the side at a point x (world) of its element from all emitters, into
+ * h[bands], and its standard error into error[bands] (0 where it is exact). Shadow rays
+ * are aimed by `seed`, as many as it takes for an error of `relative` times h, within
+ * limits. The result depends on nothing else. 0, or -1 and e when memory is short.
+ * O(emitters x bodies between). */
+int direct_at(struct direct_worker *w, const double x[3], uint64_t seed, double relative,
+              double *h, double *error, struct err *e);
+
+/* Shadow rays traced so far. */
+uint64_t direct_rays(const struct direct_worker *w);
+
+#endif

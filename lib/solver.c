@@ -1,0 +1,294 @@
+#include "solver.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bsdf.h"
+#include "mem.h"
+
+/* ---- the beginning and the end ---- */
+
+double solver_emitted(const struct model *m, uint32_t ps, int band)
+{
+	if (!model_side_modelled(m, ps))
+		return 0;
+	return m->patch_area[ps >> 1] *
+	       bsdf_exitance(&m->material, model_patch_material(m, ps >> 1), (int)(ps & 1), band);
+}
+
+static uint32_t group_of(const struct solver *v, uint32_t ps)
+{
+	return v->s->emitter_group[model_patch_material(v->t->m, ps >> 1)];
+}
+
+static void weigh_components(struct solver *v)
+{
+	const struct solution *s = v->s;
+	size_t bands = (size_t)s->bands, vectors = v->sender.vectors;
+
+	for (uint32_t ps = 0; ps < s->patch_sides; ps++)
+		for (int k = 0; k < s->bands; k++)
+			v->emitted[v->parts.of[ps] * s->groups + group_of(v, ps)] +=
+				solver_emitted(v->t->m, ps, k);
+	for (size_t i = 0; i < v->parts.n; i++)
+		for (size_t c = 0; c < v->sender.channels; c++) {
+			double emitted = v->emitted[i * s->groups + c / bands];
+			double weight = emitted > 0 ? 1 / emitted : 0;
+			((double *)(v->weight + i * vectors))[c] = weight;
+			v->weight_max[i] = fmax(v->weight_max[i], weight);
+		}
+}
+
+static int new_arrays(struct solver *v, struct err *e)
+{
+	size_t parts = v->parts.n, vectors = v->sender.vectors, sides = v->s->patch_sides;
+
+	v->emitted = mem_new(parts * v->s->groups, sizeof *v->emitted, "priorities", e);
+	v->part = mem_new(parts * v->s->groups, sizeof *v->part, "priorities", e);
+	v->weight_max = mem_new(parts, sizeof *v->weight_max, "priorities", e);
+	v->priority = mem_new(sides, sizeof *v->priority, "priorities", e);
+	v->links = mem_new(sides, sizeof *v->links, "priorities", e);
+	v->weight = lanes_new(parts * vectors, &v->room[0], "priorities", e);
+	v->out = lanes_new(vectors, &v->room[1], "flux", e);
+	v->emission = lanes_new(vectors, &v->room[2], "flux", e);
+	v->diffuse = lanes_new(vectors, &v->room[3], "flux", e);
+	v->unshot = lanes_new(vectors, &v->room[4], "flux", e);
+	return v->emitted && v->part && v->weight_max && v->priority && v->links && v->weight &&
+	       v->out && v->emission && v->diffuse && v->unshot ? 0 : -1;
+}
+
+int solver_init(struct solver *v, struct solution *s, const struct transport *t,
+                struct err *e)
+{
+	*v = (struct solver){ .s = s, .t = t };
+	if (sender_init(&v->sender, t, s->groups, e) || sender_load(&v->sender, s, e) ||
+	    sent_new(&v->sent, v->sender.vectors, e) || components_init(&v->parts, t, e) ||
+	    new_arrays(v, e))
+		return -1;
+	weigh_components(v);
+	for (uint32_t ps = 0; ps < s->patch_sides; ps++)
+		v->sides += t->diffuse_row[ps] != FF_NO_ROW || t->emission_row[ps] != FF_NO_ROW ||
+		            t->target_link[ps] < t->target_link[ps + 1];
+	return 0;
+}
+
+void solver_free(struct solver *v)
+{
+	for (size_t i = 0; i < sizeof v->room / sizeof *v->room; i++)
+		free(v->room[i]);
+	free(v->emitted);
+	free(v->part);
+	free(v->weight_max);
+	free(v->priority);
+	free(v->links);
+	sent_free(&v->sent);
+	sender_free(&v->sender);
+	components_free(&v->parts);
+}
+
+/* ---- unshot flux ---- */
+
+static void check_ledger(struct solver *v)
+{
+	const struct solution *s = v->s;
+	size_t channels = v->sender.channels;
+
+	for (size_t c = 0; c < channels; c++) {
+		double in = s->ledger[c], out = ((const double *)v->unshot)[c];
+		for (size_t term = LEDGER_ABSORBED; term < LEDGER_TERMS; term++)
+			out += s->ledger[term * channels + c];
+		if (in > 0)
+			v->residual = fmax(v->residual, fabs(in - out) / in);
+	}
+}
+
+/* Counts unshot flux of a side; its magnitude by weight. */
+static double count(struct solver *v, uint32_t ps, const lanes *flux)
+{
+	size_t vectors = v->sender.vectors, bands = (size_t)v->s->bands;
+	const lanes *weight = v->weight + v->parts.of[ps] * vectors;
+	double *part = v->part + v->parts.of[ps] * v->s->groups, sum = 0;
+
+	for (size_t i = 0; i < vectors; i++) {
+		lanes magnitude = lanes_abs(flux[i]), weighted = magnitude * weight[i];
+		v->unshot[i] += flux[i];
+		for (size_t c = i * LANES; c < (i + 1) * LANES && c < v->sender.channels; c++) {
+			part[c / bands] += weighted[c % LANES];
+			v->negative |= flux[i][c % LANES] < 0;
+		}
+		v->magnitude += lanes_total(&magnitude, 1);
+		sum += lanes_total(&weighted, 1);
+	}
+	return sum;
+}
+
+static void load_emission(const struct solver *v, uint32_t ps, lanes *to)
+{
+	size_t bands = (size_t)v->s->bands;
+
+	memset(to, 0, v->sender.vectors * sizeof *to);
+	memcpy((double *)to + group_of(v, ps) * bands, v->s->unshot_emission + ps * bands,
+	       bands * sizeof(double));
+}
+
+double solver_survey(struct solver *v, double *worst)
+{
+	struct sender *s = &v->sender;
+	size_t vectors = s->vectors;
+	double top = 0;
+
+	memset(v->unshot, 0, vectors * sizeof *v->unshot);
+	memset(v->part, 0, v->parts.n * v->s->groups * sizeof *v->part);
+	v->magnitude = v->negative = 0;
+	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++) {
+		const uint64_t *first = v->t->target_link + ps;
+		v->links[ps] = s->link_gain[ps] = 0;
+		for (uint64_t l = 2 * first[0]; l < 2 * first[1]; l++)
+			v->links[ps] += count(v, ps, s->unshot_link + l * vectors);
+		load_emission(v, ps, v->emission);
+		v->priority[ps] = v->links[ps] + count(v, ps, v->emission) +
+		                  count(v, ps, s->unshot_diffuse + ps * vectors);
+		top = fmax(top, v->priority[ps]);
+	}
+	*worst = 0;
+	for (size_t i = 0; i < v->parts.n * v->s->groups; i++)
+		*worst = fmax(*worst, v->part[i]);
+	check_ledger(v);
+	return top;
+}
+
+/* ---- shots ---- */
+
+/* Sends flux by a row, scaled by channel if `share` is given. */
+static void shoot_row(struct solver *v, uint32_t row, int freshness, const lanes *from,
+                      const lanes *share, double *shot)
+{
+	lanes flux[VECTORS_MAX];
+	size_t vectors = v->sender.vectors, channels = v->sender.channels;
+
+	for (size_t i = 0; i < vectors; i++)
+		flux[i] = share ? from[i] * share[i] : from[i];
+	if (!(lanes_magnitude(flux, vectors) > 0))
+		return;
+	if (shot)
+		shot += (2 * (size_t)row + (size_t)freshness) * channels;
+	for (size_t c = 0; shot && c < channels; c++)
+		shot[c] += ((const double *)flux)[c];
+	send_row(&v->sender, row, freshness, flux, &v->sent);
+}
+
+void solver_send_diffuse(struct solver *v, uint32_t ps, const lanes *flux, double *shot)
+{
+	if (v->t->diffuse_row[ps] != FF_NO_ROW)
+		shoot_row(v, v->t->diffuse_row[ps], MIXED, flux, NULL, shot);
+}
+
+void solver_lobe_shares(const struct solver *v, uint32_t ps, lanes *share)
+{
+	const struct model *m = v->t->m;
+	const struct materials *mt = &m->material;
+	uint32_t material = model_patch_material(m, ps >> 1);
+	size_t at = material_at(mt, material, (int)(ps & 1)), vectors = v->sender.vectors;
+	int lobe_r = bsdf_has_lobe(mt, material, (int)(ps & 1), 0);
+	int lobe_t = bsdf_has_lobe(mt, material, (int)(ps & 1), 1);
+	double *r = (double *)share, *t = (double *)(share + vectors);
+
+	memset(share, 0, 2 * vectors * sizeof *share);
+	for (size_t c = 0; c < v->sender.channels; c++) {
+		size_t k = c % (size_t)m->bands;
+		double rho = lobe_r ? mt->rho_s[at + k] : 0;
+		double tau = lobe_t ? mt->tau_s[at + k] : 0;
+		r[c] = rho + tau > 0 ? rho / (rho + tau) : 0;
+		t[c] = rho + tau > 0 ? 1 - r[c] : 0;
+	}
+}
+
+void solver_send_link(struct solver *v, uint64_t l, const lanes *flux, double *shot)
+{
+	const struct transport *t = v->t;
+	lanes share[2 * VECTORS_MAX];
+
+	solver_lobe_shares(v, t->link_target[l >> 1], share);
+	for (uint64_t way = 0; way < 2; way++) {
+		uint32_t row = t->link_row[(l & ~(uint64_t)1) + way];
+		if (row != FF_NO_ROW)
+			shoot_row(v, row, (int)(l & 1), flux, share + way * v->sender.vectors, shot);
+	}
+}
+
+/* Moves unshot flux out of its array before it is sent: what comes back to the same
+ * side during the shot waits for the next. */
+static void take(lanes *from, lanes *to, lanes *out, size_t vectors)
+{
+	for (size_t i = 0; i < vectors; i++) {
+		to[i] = from[i];
+		out[i] += from[i];
+		from[i] = (lanes){ 0 };
+	}
+}
+
+static void shoot_links(struct solver *v, uint32_t ps)
+{
+	const struct transport *t = v->t;
+	size_t vectors = v->sender.vectors;
+	lanes now[VECTORS_MAX];
+
+	for (uint64_t l = 2 * t->target_link[ps]; l < 2 * t->target_link[ps + 1]; l++) {
+		lanes *u = v->sender.unshot_link + l * vectors;
+		if (!(lanes_magnitude(u, vectors) > 0))
+			continue;
+		take(u, now, v->out, vectors);
+		solver_send_link(v, l, now, v->s->shot);
+	}
+}
+
+void solver_book(struct solver *v, const lanes *out)
+{
+	struct solution *s = v->s;
+	size_t channels = v->sender.channels;
+	const double *absorbed = (const double *)v->sent.absorbed;
+	const double *escaped = (const double *)v->sent.escaped;
+	const double *lost = (const double *)v->sent.lost, *cut = (const double *)v->sent.cut;
+	const double *kept = (const double *)v->sent.kept, *taken = (const double *)out;
+
+	for (size_t c = 0; c < channels; c++) {
+		double gone = absorbed[c] + escaped[c] + lost[c] + cut[c];
+		s->ledger[LEDGER_ABSORBED * channels + c] += absorbed[c];
+		s->ledger[LEDGER_ESCAPED * channels + c] += escaped[c];
+		s->ledger[LEDGER_LOST * channels + c] += lost[c];
+		s->ledger[LEDGER_CUT * channels + c] += cut[c];
+		v->guessed += ((const double *)v->sent.guessed)[c];
+		if (s->ledger[c] > 0)
+			v->residual = fmax(v->residual,
+			                   fabs(taken[c] - gone - kept[c]) / s->ledger[c]);
+	}
+	sent_clear(&v->sent);
+}
+
+static void take_emission(struct solver *v, uint32_t ps)
+{
+	size_t bands = (size_t)v->s->bands;
+
+	load_emission(v, ps, v->emission);
+	memset(v->s->unshot_emission + ps * bands, 0, bands * sizeof(double));
+	for (size_t i = 0; i < v->sender.vectors; i++)
+		v->out[i] += v->emission[i];
+}
+
+void solver_shoot(struct solver *v, uint32_t ps)
+{
+	const struct transport *t = v->t;
+	size_t vectors = v->sender.vectors;
+	uint32_t row = t->emission_row[ps] != FF_NO_ROW ? t->emission_row[ps] : t->diffuse_row[ps];
+
+	memset(v->out, 0, vectors * sizeof *v->out);
+	take_emission(v, ps);
+	take(v->sender.unshot_diffuse + ps * vectors, v->diffuse, v->out, vectors);
+	if (row != FF_NO_ROW)
+		shoot_row(v, row, FRESH, v->emission, NULL, v->s->shot);
+	solver_send_diffuse(v, ps, v->diffuse, v->s->shot);
+	shoot_links(v, ps);
+	solver_book(v, v->out);
+	v->s->shots++;
+}

@@ -1,0 +1,67 @@
+/* The state of the solver at work, and shots (private to the solver).
+ *
+ * Unshot flux may be negative after overshooting; shots take it as it comes. */
+#ifndef TWOPASS_SOLVER_H
+#define TWOPASS_SOLVER_H
+
+#include "components.h"
+#include "radiosity.h"
+#include "send.h"
+
+struct solver {
+	struct solution *s;
+	const struct transport *t;
+	struct sender sender;
+	struct components parts;
+	struct sent sent;        /* what became of the shot in work */
+	lanes *out;              /* [vectors] what it took away */
+	lanes *emission;         /* [vectors] of that, what was emission */
+	lanes *diffuse;          /* [vectors] and what was to leave diffusely */
+	double *emitted;         /* [components][groups] flux, all bands */
+	lanes *weight;           /* [components][vectors] 1 / emitted, by group */
+	double *weight_max;      /* [components] the largest */
+	double *priority;        /* [2P] unshot flux by weight when the round began */
+	double *links;           /* [2P] its part of a side's links */
+	double *part;            /* [components][groups] unshot flux by weight */
+	lanes *unshot;           /* [vectors] in all, then */
+	double magnitude;        /* sum of its absolute values */
+	int negative;            /* some of it is below 0 */
+	size_t sides;            /* that can shoot */
+	double guessed, residual;
+	void *room[5];           /* memory of the vectors */
+};
+
+/* 0, or -1 and e; to be freed either way. */
+int solver_init(struct solver *v, struct solution *s, const struct transport *t,
+                struct err *e);
+void solver_free(struct solver *v);
+
+/* Flux that a patch-side emits. */
+double solver_emitted(const struct model *m, uint32_t ps, int band);
+
+/* Looks at all unshot flux: priority, links, unshot, magnitude, negative. Returns the
+ * largest priority; the worst component's and group's unshot over emitted flux goes to
+ * *worst. Checks the ledger. O(sides + links). */
+double solver_survey(struct solver *v, double *worst);
+
+/* Sends all unshot flux of a patch-side. */
+void solver_shoot(struct solver *v, uint32_t ps);
+
+/* Sends flux to leave diffusely by a side, or by the lobes of link index l (2 link +
+ * freshness), without taking it from anywhere; adds to v->sent and to `shot`, which may
+ * be NULL. */
+void solver_send_diffuse(struct solver *v, uint32_t ps, const lanes *flux, double *shot);
+void solver_send_link(struct solver *v, uint64_t l, const lanes *flux, double *shot);
+
+/* The shares of a target's directional flux that leave by R and by T, [2][vectors]. */
+void solver_lobe_shares(const struct solver *v, uint32_t ps, lanes *share);
+
+/* Books v->sent in the ledger, where `out` was taken from unshot flux. */
+void solver_book(struct solver *v, const lanes *out);
+
+/* Brings unshot / emitted of every component and group to `stop` or near it: GMRES for
+ * what is still to be sent, and one shot of that by all sides. 1 if it made less of it,
+ * 0 if it did not, -1 and e. O(passes x runs). */
+int solver_overshoot(struct solver *v, double worst, double stop, struct err *e);
+
+#endif

@@ -1,0 +1,130 @@
+/* What all views of a scene share. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "mem.h"
+#include "view_path.h"
+
+static const double pi = 3.14159265358979323846;
+
+static struct view_lobe lobe_of(const double *coefficient, int bands, double k)
+{
+	for (int b = 0; b < bands; b++)
+		if (coefficient[b] > 0)
+			return (struct view_lobe){ coefficient, k };
+	return (struct view_lobe){ NULL, 0 };
+}
+
+static void tabulate_side(const struct materials *mt, size_t material, int side,
+                          struct view_side *s)
+{
+	size_t here = material_at(mt, material, side), across = material_at(mt, material, !side);
+
+	s->black = side == BACK && mt->one_sided[material];
+	for (int b = 0; b < mt->bands; b++) {
+		s->here[b] = mt->rho_d[here + (size_t)b] / pi;
+		s->across[b] = mt->tau_d[across + (size_t)b] / pi;
+		s->diffuse |= s->here[b] > 0;
+		s->translucent |= s->across[b] > 0;
+		s->emits |= mt->emission[here + (size_t)b] > 0;
+	}
+	s->reflected = lobe_of(&mt->rho_s[here], mt->bands,
+	                       mt->alpha[2 * material + (size_t)side]);
+	s->transmitted = lobe_of(&mt->tau_s[across], mt->bands,
+	                         mt->beta[2 * material + (size_t)!side]);
+}
+
+/* U with L_e + M/pi + s U <= U for what one corner of an element-side shows, s its
+ * directional weight: then no tail brings more than the largest U of the scene. */
+static double corner_ceiling(const struct view_scene *v, size_t material, int side,
+                             const float *h, int band)
+{
+	const struct materials *mt = &v->m->material;
+	const struct view_side *s = &v->side[2 * material + (size_t)side];
+	double m = mt->emission_exponent[2 * material + (size_t)side];
+	double own = mt->emission[material_at(mt, material, side) + (size_t)band];
+	double kept = 1;
+
+	if (own > 0 && m < 1)
+		return (double)INFINITY;
+	own += s->here[band] * (double)h[side * mt->bands + band] +
+	       s->across[band] * (double)h[!side * mt->bands + band];
+	if (s->reflected.coefficient)
+		kept -= s->reflected.coefficient[band];
+	if (s->transmitted.coefficient)
+		kept -= s->transmitted.coefficient[band];
+	if (kept < -1e-6)
+		return (double)INFINITY;
+	return own > 0 ? own / fmax(kept, 0) : 0;
+}
+
+static void find_ceiling(struct view_scene *v)
+{
+	const struct model *m = v->m;
+	size_t bands = (size_t)m->bands;
+
+	for (size_t c = 0; c < 3 * m->elements; c++) {
+		size_t material = model_patch_material(m, m->element_patch[c / 3]);
+		for (int side = 0; side < 2; side++)
+			for (int b = 0; b < m->bands && !v->side[2 * material + (size_t)side].black; b++)
+				v->ceiling[b] = fmax(v->ceiling[b],
+				                     corner_ceiling(v, material, side,
+				                                    v->all.corner + 2 * bands * c, b));
+	}
+}
+
+static int tabulate(struct view_scene *v, struct err *e)
+{
+	size_t sides = 2 * v->m->material.n;
+
+	v->side = mem_new(sides, sizeof *v->side, "materials of the view", e);
+	for (size_t i = 0; v->side && i < sides; i++) {
+		tabulate_side(&v->m->material, i / 2, (int)(i % 2), &v->side[i]);
+		v->tails |= v->side[i].reflected.coefficient || v->side[i].transmitted.coefficient;
+	}
+	return v->side ? 0 : -1;
+}
+
+/* All light is interpolated where it is not recomputed, and behind what blurs it. */
+static int interpolate(struct view_scene *v, const struct solution *s, int threads, struct err *e)
+{
+	static const unsigned kept[] = { PART_ALL, PART_CAUSTIC | PART_INDIRECT };
+
+	if ((v->method == VIEW_MESH || v->tails) &&
+	    reconstruct(v->m, s, PART_ALL, threads, &v->all, e))
+		return -1;
+	return v->method != VIEW_MESH &&
+	       reconstruct(v->m, s, kept[v->method], threads, &v->part, e) ? -1 : 0;
+}
+
+struct view_scene *view_scene_new(const struct model *m, const struct solution *s,
+                                  const struct ray_scene *rays, enum view_method method,
+                                  int threads, struct err *e)
+{
+	struct view_scene *v = mem_new(1, sizeof *v, "view", e);
+
+	if (!v)
+		return NULL;
+	v->m = m;
+	v->rays = rays;
+	v->method = method;
+	if (!tabulate(v, e) && !interpolate(v, s, threads, e) &&
+	    (method == VIEW_MESH || (v->direct = direct_new(m, rays, e)))) {
+		if (v->tails)
+			find_ceiling(v);
+		return v;
+	}
+	view_scene_free(v);
+	return NULL;
+}
+
+void view_scene_free(struct view_scene *v)
+{
+	if (!v)
+		return;
+	direct_free(v->direct);
+	reconstruction_free(&v->all);
+	reconstruction_free(&v->part);
+	free(v->side);
+	free(v);
+}

@@ -1,0 +1,80 @@
+#include "view_shade.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+int view_shader_init(struct view_shader *s, const struct view_scene *v, struct err *e)
+{
+	*s = (struct view_shader){ .v = v, .relative = 1e-2 };
+	s->direct = direct_worker_new(v->direct, e);
+	return s->direct ? 0 : -1;
+}
+
+void view_shader_free(struct view_shader *s)
+{
+	direct_worker_free(s->direct);
+	free(s->request.data);
+	free(s->weight.data);
+	free(s->order.data);
+}
+
+/* Asks for the light that arrives on one side of the point of the last request. */
+static void put_order(struct view_shader *s, const struct view_request *q, int side)
+{
+	uint64_t key = (2 * (uint64_t)q->element + (uint64_t)side) << 31 | (s->request.n - 1);
+
+	vec_append(&s->order, &key, 1, sizeof key, &s->e);
+}
+
+void view_shader_put(struct view_shader *s, const struct view_request *q, const double *weight)
+{
+	const struct view_side *side = &s->v->side[2 * q->material + (uint32_t)q->side];
+
+	if (vec_append(&s->request, q, 1, sizeof *q, &s->e) ||
+	    vec_append(&s->weight, weight, (size_t)s->v->m->bands, sizeof *weight, &s->e))
+		return;
+	if (side->diffuse)
+		put_order(s, q, q->side);
+	if (side->translucent)
+		put_order(s, q, !q->side);
+}
+
+static int by_key(const void *x, const void *y)
+{
+	uint64_t a = *(const uint64_t *)x, b = *(const uint64_t *)y;
+
+	return (a > b) - (a < b);
+}
+
+/* Adds the light that arrives on a side of a point. */
+static void shade(struct view_shader *s, size_t request, int side, const struct view_sums *to)
+{
+	size_t bands = (size_t)s->v->m->bands;
+	const struct view_request *q = (const struct view_request *)s->request.data + request;
+	const double *weight = (const double *)s->weight.data + request * bands;
+	const struct view_side *seen = &s->v->side[2 * q->material + (uint32_t)q->side];
+	const double *part = side == q->side ? seen->here : seen->across;
+	double *light = (q->directional ? to->directional : to->diffuse) + q->pixel * bands;
+	double *square = to->square + q->pixel * bands;
+	double h[BANDS_MAX], error[BANDS_MAX];
+
+	direct_begin(s->direct, 2 * q->element + (uint32_t)side);
+	if (direct_at(s->direct, q->x, q->seed, s->relative, h, error, &s->e))
+		return;
+	for (size_t b = 0; b < bands; b++) {
+		double off = weight[b] * part[b] * error[b];
+		light[b] += weight[b] * part[b] * h[b];
+		square[b] += off * off;
+	}
+}
+
+void view_shader_run(struct view_shader *s, const struct view_sums *to)
+{
+	const uint64_t *order = s->order.data;
+
+	if (s->order.n)
+		qsort(s->order.data, s->order.n, sizeof *order, by_key);
+	for (size_t i = 0; i < s->order.n && !s->e.set; i++)
+		shade(s, order[i] & INT32_MAX, (int)(order[i] >> 31 & 1), to);
+	s->request.n = s->weight.n = s->order.n = 0;
+}

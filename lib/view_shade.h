@@ -1,0 +1,45 @@
+/* Light that is computed for each point: points are collected over a tile of the picture,
+ * then shaded in the order of the surfaces they are on, which share what is between them
+ * and the emitters. */
+#ifndef TWOPASS_VIEW_SHADE_H
+#define TWOPASS_VIEW_SHADE_H
+
+#include "mem.h"
+#include "view_path.h"
+
+/* A point whose diffuse light goes, by `weight`, into a pixel's diffuse or directional
+ * part. */
+struct view_request {
+	uint32_t element, material, pixel;
+	int side, directional;
+	double x[3], w[3];          /* world; weights of the element's corners */
+	uint64_t seed;
+};
+
+/* One thread's. */
+struct view_shader {
+	const struct view_scene *v;
+	double relative;            /* error of sampled light to aim at */
+	struct direct_worker *direct;
+	struct vec request;         /* struct view_request */
+	struct vec weight;          /* double [bands] for each */
+	struct vec order;           /* uint64_t: element-side that light arrives on, request */
+	struct err e;               /* the first failure */
+};
+
+/* 0, or -1 and e. To be freed in any case. */
+int view_shader_init(struct view_shader *s, const struct view_scene *v, struct err *e);
+void view_shader_free(struct view_shader *s);
+
+void view_shader_put(struct view_shader *s, const struct view_request *q, const double *weight);
+
+/* Sums over the samples of a tile's pixels, [pixels][bands]. */
+struct view_sums {
+	double *diffuse, *directional, *emission;
+	double *square;             /* of independent standard errors */
+};
+
+/* Shades the points collected since the last call and forgets them. */
+void view_shader_run(struct view_shader *s, const struct view_sums *to);
+
+#endif
