@@ -14,7 +14,11 @@
  * through it, whose length stays. Edges decide. */
 static const double left = .70710678118654752;
 
+/* Of the variance, what an estimate that has it subtracted may still be off by. */
+static const double doubtful = 2;
+
 enum {
+	ELEMENTS_A_PATCH = 5, /* at least, when it is halved */
 	HALVINGS_MAX = 4, /* in one step: to a quarter of the edge, as far as an estimate
 	                     made of whole elements can be trusted */
 	BISECTIONS = 40
@@ -25,18 +29,20 @@ struct plan {
 	double *energy;       /* [elements] */
 	double *patch_energy; /* [patches] what they cost others */
 	uint8_t *most;        /* [elements] halvings that the least size leaves room for */
+	uint8_t *halvings;    /* [elements] that a bound leads to, and of patches */
+	uint8_t *patch_halvings;
 	double allowed;       /* sum of energies that is asked for */
 	size_t elements;      /* and no more than so many elements */
 };
 
 /* Square of the error of an element-side's irradiance, as far as it is certain: an estimate
- * from few elements is off by about as much as the noise of their light, of which only light
+ * from few elements is off by as much as the noise of their light, of which only light
  * straight from emitters is free. */
 static double certain(const struct solution *s, size_t at)
 {
 	double d = s->discretisation[at], noise = s->error[at], direct = s->error_direct[at];
 
-	return fmax(0, d * d - fmax(0, noise * noise - direct * direct));
+	return fmax(0, d * d - doubtful * fmax(0, noise * noise - direct * direct));
 }
 
 /* Adds up the error of what one side shows, in units of irradiance: coefficients times the
@@ -117,27 +123,45 @@ static uint8_t halvings(double energy, uint8_t most, double bound)
 	return n;
 }
 
-/* What a bound leads to. */
-static double expect(const struct plan *p, double bound, size_t *elements)
+/* Halvings of the elements of a patch that leave enough of them in its parts. */
+static uint8_t halvings_with(const struct plan *p, uint32_t patch)
 {
+	double elements = p->m->patch_start[patch + 1] - p->m->patch_start[patch];
+	double wanted = p->patch_halvings[patch] + log2(ELEMENTS_A_PATCH / elements);
+
+	return p->patch_halvings[patch] && wanted > .5 ? (uint8_t)fmin(HALVINGS_MAX, wanted + .5) : 0;
+}
+
+/* What a bound leads to: halvings, elements, and the sum of energies that is left. A patch
+ * more costs less than an element more. */
+static double expect(struct plan *p, double bound, size_t *elements)
+{
+	const struct model *m = p->m;
 	double sum = 0, kept[HALVINGS_MAX + 1] = { 1 };
 
 	for (int n = 0; n < HALVINGS_MAX; n++)
 		kept[n + 1] = kept[n] * left;
 	*elements = 0;
-	for (size_t i = 0; i < p->m->elements; i++) {
-		uint8_t n = halvings(p->energy[i], p->most[i], bound);
-		sum += p->energy[i] * kept[n];
-		*elements += (size_t)1 << n;
+	for (uint32_t i = 0; i < m->patches; i++) {
+		uint8_t n = halvings(p->patch_energy[i], HALVINGS_MAX, bound), with;
+		p->patch_halvings[i] = n;
+		with = halvings_with(p, i);
+		sum += p->patch_energy[i] * kept[n];
+		for (uint32_t k = m->patch_start[i]; k < m->patch_start[i + 1]; k++) {
+			n = halvings(p->energy[k], p->most[k], bound);
+			if (n < with)
+				n = with < p->most[k] ? with : p->most[k];
+			p->halvings[k] = n;
+			sum += p->energy[k] * kept[n];
+			*elements += (size_t)1 << n;
+		}
 	}
-	for (size_t i = 0; i < p->m->patches; i++)
-		sum += p->patch_energy[i] * kept[halvings(p->patch_energy[i], HALVINGS_MAX, bound / 4)];
 	return sum;
 }
 
 /* The largest bound that leaves no more than the allowed sum, or the least that does not
  * take too many elements. */
-static double find_bound(const struct plan *p)
+static double find_bound(struct plan *p)
 {
 	double low = 0, high = 0;
 	size_t elements;
@@ -171,7 +195,8 @@ int adapt_plan(const struct model *m, const struct solution *s, const struct mes
                double smallest, uint8_t *halving, uint8_t *patch_halving,
                struct mesher_report *r, struct err *e)
 {
-	struct plan p = { .m = m, .elements = o->elements };
+	struct plan p = { .m = m, .elements = o->elements, .halvings = halving,
+		          .patch_halvings = patch_halving };
 	size_t elements;
 
 	p.energy = mem_new(m->elements, sizeof *p.energy, "errors of elements", e);
@@ -186,21 +211,15 @@ int adapt_plan(const struct model *m, const struct solution *s, const struct mes
 		double own = total(p.energy, m->elements);
 		double others = total(p.patch_energy, m->patches);
 		double bound = own + others <= p.allowed ? INFINITY : find_bound(&p);
-		for (size_t i = 0; i < m->patches; i++) {
-			patch_halving[i] = halvings(p.patch_energy[i], HALVINGS_MAX, bound / 4);
-			r->patches_marked += patch_halving[i] > 0;
-		}
-		for (size_t i = 0; i < m->elements; i++) {
-			uint8_t with_patch = patch_halving[m->element_patch[i]];
-			halving[i] = halvings(p.energy[i], p.most[i], bound);
-			r->marked += halving[i] > 0;
-			if (halving[i] < with_patch)
-				halving[i] = with_patch < p.most[i] ? with_patch : p.most[i];
-		}
+		double expected = expect(&p, bound, &elements);
+		for (size_t i = 0; i < m->elements; i++)
+			r->marked += p.energy[i] > bound && p.most[i] > 0;
+		for (size_t i = 0; i < m->patches; i++)
+			r->patches_marked += p.patch_energy[i] > bound;
 		if (unit > 0) {
 			r->error_before = sqrt((own + others) / unit);
 			r->patch_error_before = sqrt(others / unit);
-			r->error_expected = sqrt(expect(&p, bound, &elements) / unit);
+			r->error_expected = sqrt(expected / unit);
 		}
 	}
 	free(p.energy);

@@ -24,7 +24,7 @@ static const double misfit = .25;
 static const double certain = 4;
 
 /* Looking at an element from afar takes so much less time than a ray. */
-enum { LOOKS_A_RAY = 4, ELEMENTS_A_PATCH = 5 };
+enum { LOOKS_A_RAY = 4, ELEMENTS_A_PATCH = 5, RAYS_MIN = 16 };
 
 struct gatherer {
 	const struct ff_job *job;
@@ -113,9 +113,10 @@ static int is_by_formula(const struct ff_job *j, uint32_t ps)
 /* Small patches are not worth more rays for each area than most are. */
 static int takes(const struct ff_job *j, double patch_area, double element_area, uint32_t rays)
 {
+	double part = j->o.gather_by_area ? fmin(1, patch_area / j->gather.common) : 1;
+
 	return patch_area >= larger * element_area &&
-	       rays * patch_area >= enough * j->o.rays * element_area *
-	                            fmin(1, patch_area / j->gather.common);
+	       rays * patch_area >= enough * part * j->o.rays * element_area;
 }
 
 /* The next place in the sequence from which n points are as well stratified as n can be,
@@ -147,7 +148,7 @@ static void plan(struct ff_job *j)
 	for (uint32_t i = 0; i < m->elements; i++) {
 		double want = ELEMENTS_A_PATCH * j->o.gather * m->element_area[i] / g->common;
 		int fewer = 0;
-		while (fewer < FF_FEWER && (j->o.gather >> fewer) > 1 &&
+		while (j->o.gather_by_area && fewer < FF_FEWER && (j->o.gather >> fewer) >= 2 * RAYS_MIN &&
 		       (j->o.gather >> fewer) > want * sqrt(2))
 			fewer++;
 		g->rays[i] = j->o.gather >> fewer;

@@ -334,7 +334,7 @@ static uint32_t row_rays(const struct ff_job *j, uint32_t ps)
 
 	if (j->emits[ps])
 		return rays * j->o.emitter_gain;
-	if (!j->gather.done || j->has_lobe[ps])
+	if (!j->gather.done || !j->o.gather_by_area || j->has_lobe[ps])
 		return rays;
 	while (fewer < FF_FEWER && (rays >> fewer) * j->gather.common >
 	                               rays * j->m->patch_area[ps >> 1] * sqrt(2))

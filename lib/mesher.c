@@ -71,7 +71,7 @@ static int make_patches(struct model *m, const struct mesher_options *o,
 	uint32_t *patch = mem_new(m->elements, sizeof *patch, "patches", e);
 	double cos_cone = cos(o->normal_cone * acos(-1) / 180);
 	int status = patch && !find_patches(m, r->patch_size, cos_cone, patch, &patches, e) &&
-	             !order_model(m, patch, patches, NULL, e) ? 0 : -1;
+	             !order_model(m, patch, patches, e) ? 0 : -1;
 
 	free(patch);
 	return status;
@@ -228,7 +228,7 @@ static int divide_further(struct model *m, const struct mesher_options *o,
 	int status = before && patch &&
 	             !split_patches(m, r->patch_size, cos_cone, before, old->patches, plan->patch,
 	                            patch, &patches, e) &&
-	             !order_model(m, patch, patches, *origin, e) ? 0 : -1;
+	             !order_elements(m, patch, patches, *origin, e) ? 0 : -1;
 	free(before);
 	free(patch);
 	return status;

@@ -127,15 +127,19 @@ int merge_patches(const struct division *d, uint32_t *patch, size_t *count, stru
 int find_patches(const struct model *m, double size, double cos_cone, uint32_t *patch,
                  size_t *count, struct err *e);
 
-/* Halves earlier patches, old[element], so many times, but not to fewer than a few elements. */
+/* Halves earlier patches, old[element], so many times, but not to fewer than a few elements.
+ * The parts of a patch follow those of the patch before it. */
 int split_patches(const struct model *m, double size, double cos_cone, const uint32_t *old,
                   size_t patches, const uint8_t *halvings, uint32_t *patch, size_t *count,
                   struct err *e);
 
 /* order.c: renumbers patches, elements and vertices along a Morton curve over
- * the scene's box and fills the patch arrays. origin[element], if not NULL, moves along. */
-int order_model(struct model *m, const uint32_t *patch, size_t patches, uint32_t *origin,
-                struct err *e);
+ * the scene's box and fills the patch arrays. */
+int order_model(struct model *m, const uint32_t *patch, size_t patches, struct err *e);
+
+/* The same for patches that keep their numbers; origin[element] moves with the elements. */
+int order_elements(struct model *m, const uint32_t *patch, size_t patches, uint32_t *origin,
+                   struct err *e);
 
 
 /* outline.c: the loops of planar patches. Needs model_derive. */

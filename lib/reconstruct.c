@@ -13,19 +13,14 @@
 #define COS_CREASE .86602540378443865
 
 enum {
-	NARROW_RINGS = 3, /* of elements about the vertex that a fit may need */
-	RINGS = 3,    /* that it may be widened by to smooth noise */
+	RINGS = 3,    /* of neighbours that a fit may reach */
 	NEAR_MAX = 96,/* elements that one of them may add */
-	SEEN_MAX = 4096, /* corners that may be looked at for it */
-	CHANNELS_MAX = 4 * BANDS_MAX
+	SEEN_MAX = 4096 /* corners that may be looked at for it */
 };
 
 /* A fit is used if its variance at the vertex is at most this many times the
  * variance of one element. */
 static const double accepted_variance = 1.5;
-
-/* Noise of this part of a value is not worth a wider fit. */
-static const double still = .03;
 
 /* A linear function over some elements near a vertex, in coordinates (x, y) of the
  * tangent plane about it: value = mean + gradient . (-mx, -my). */
@@ -99,10 +94,10 @@ static void list_group(const struct job *j, struct scratch *s, size_t group, siz
 	}
 }
 
-/* Adds to the *list of elements those of the same smooth surface that touch
- * [begin, end) of it and face the same way as the group. Returns how many. */
+/* Adds the elements of the same smooth surface that touch those listed from
+ * `begin` on and face the same way as the group. Returns how many. */
 static size_t add_ring(const struct job *j, struct scratch *s, size_t group,
-                       const double normal[3], size_t begin, size_t end, size_t *list)
+                       const double normal[3], size_t begin, size_t end)
 {
 	size_t n = end, seen = 0;
 
@@ -111,10 +106,8 @@ static size_t add_ring(const struct job *j, struct scratch *s, size_t group,
 			uint32_t c = j->g.group[3 * (size_t)s->near[i].element + k];
 			for (uint32_t q = j->g.start[c]; q < j->g.start[c + 1]; q++) {
 				uint32_t e = j->g.corner[q] / 3;
-				if (n - end >= NEAR_MAX || seen++ >= SEEN_MAX) {
-					*list = n;
+				if (n - end >= NEAR_MAX || seen++ >= SEEN_MAX)
 					return n - end;
-				}
 				if (s->stamp[e] == (uint32_t)group + 1 ||
 				    v3_dot(normal, &j->m->element_normal[3 * (size_t)e]) <
 				        COS_CREASE)
@@ -123,7 +116,6 @@ static size_t add_ring(const struct job *j, struct scratch *s, size_t group,
 				s->near[n++] = (struct near){ .element = e };
 			}
 		}
-	*list = n;
 	return n - end;
 }
 
@@ -246,20 +238,6 @@ static double consistency(const struct job *j, const struct scratch *s,
 	return fmax(0, fmin(1, 2 - chi2 / (double)(f->n - 3)));
 }
 
-/* Mean variance of the elements at the vertex. */
-static double mean_variance(const struct job *j, const struct scratch *s, const struct fit *f,
-                            size_t channel)
-{
-	size_t channels = 2 * (size_t)j->columns;
-	double sum = 0;
-
-	for (size_t i = 0; i < f->ring1; i++) {
-		double error = j->error[s->near[i].element * channels + channel];
-		sum += error * error;
-	}
-	return sum / (double)f->ring1;
-}
-
 /* Area-weighted mean of the elements at the vertex: what is left without a fit. */
 static void average(const struct job *j, const struct scratch *s, size_t n, double sum,
                     size_t channels, double *value)
@@ -269,47 +247,6 @@ static void average(const struct job *j, const struct scratch *s, size_t n, doub
 		for (size_t i = 0; i < n; i++)
 			value[c] += (sum > 0 ? s->near[i].w : 1. / (double)n) *
 			            at(j, s->near[i].element, c);
-	}
-}
-
-/* Widens the fit of each channel for as long as it agrees with the elements and with the
- * narrow one (Lepski 1991): noise is smoothed, detail is not. variance: of the narrow
- * values, over that of an element. */
-static void widen(const struct job *j, struct scratch *s, size_t group, const double normal[3],
-                  struct fit *f, size_t begin, size_t channels, double *value)
-{
-	uint32_t vertex = j->m->element[j->g.corner[j->g.start[group]]];
-	double first[CHANNELS_MAX], open[CHANNELS_MAX], one[CHANNELS_MAX], narrow = f->variance;
-
-	for (size_t c = 0; c < channels; c++) {
-		first[c] = value[c];
-		open[c] = 1;
-		one[c] = mean_variance(j, s, f, c);
-	}
-	for (int ring = 1; ring <= RINGS; ring++) {
-		size_t end = f->n;
-		int any = 0;
-		for (size_t c = 0; c < channels; c++) {
-			if (f->variance * one[c] <= still * still * value[c] * value[c])
-				open[c] = 0;
-			any |= open[c] > 0;
-		}
-		if (!any)
-			return;
-		if (!add_ring(j, s, group, normal, begin, end, &f->n))
-			return;
-		begin = end;
-		place(j, s, f->n, vertex, normal);
-		prepare(s, f);
-		for (size_t c = 0; c < channels && f->variance <= accepted_variance; c++) {
-			if (!(open[c] > 0))
-				continue;
-			struct channel t = fit_channel(j, s, f, c);
-			double off = clamped(&t) - first[c];
-			open[c] *= fmin(consistency(j, s, f, &t, c),
-			                fmax(0, fmin(1, 2 - off * off / (narrow * one[c]))));
-			value[c] += open[c] * (clamped(&t) - value[c]);
-		}
 	}
 }
 
@@ -332,21 +269,28 @@ static void solve_group(const struct job *j, struct scratch *s, size_t group)
 	if (!facing)
 		return;
 	prepare(s, &f);
-	for (int ring = 1; ring < NARROW_RINGS && f.variance > accepted_variance; ring++) {
-		size_t end = f.n;
-		add_ring(j, s, group, normal, begin, end, &f.n);
-		begin = end;
+	for (int ring = 1; ring <= RINGS; ring++) {
+		int good = f.variance <= accepted_variance;
+		for (size_t c = 0; c < channels && good; c++) {
+			struct channel t = fit_channel(j, s, &f, c);
+			value[c] = clamped(&t);
+		}
+		if (good && !j->error)
+			return;
+		size_t more = add_ring(j, s, group, normal, begin, f.n);
+		begin = f.n;
+		f.n += more;
 		place(j, s, f.n, vertex, normal);
 		prepare(s, &f);
-	}
-	if (f.variance > accepted_variance)
+		if (!good)
+			continue;
+		for (size_t c = 0; c < channels && f.variance <= accepted_variance; c++) {
+			struct channel t = fit_channel(j, s, &f, c);
+			double b = consistency(j, s, &f, &t, c);
+			value[c] += b * (clamped(&t) - value[c]);
+		}
 		return;
-	for (size_t c = 0; c < channels; c++) {
-		struct channel t = fit_channel(j, s, &f, c);
-		value[c] = clamped(&t);
 	}
-	if (j->error)
-		widen(j, s, group, normal, &f, begin, channels, value);
 }
 
 static void solve_groups(void *arg, size_t begin, size_t end, int thread)
@@ -442,7 +386,7 @@ static void store_groups(void *arg, size_t begin, size_t end, int thread)
 
 static void run(struct job *j, int threads)
 {
-	enum { CHUNK = 1024, SPREADS = 4 };
+	enum { CHUNK = 1024, SPREADS = 3 };
 
 	par_for(j->g.groups, CHUNK, threads, solve_groups, j, NULL);
 	par_for(j->m->elements, CHUNK, threads, find_rest, j, NULL);
@@ -522,7 +466,7 @@ static int new_scratch(struct job *j, int threads, struct err *e)
 	for (int t = 0; t < threads && j->scratch; t++) {
 		struct scratch *s = &j->scratch[t];
 		s->stamp = mem_new(j->m->elements, sizeof *s->stamp, "scratch", e);
-		s->near = mem_new(most + (NARROW_RINGS + RINGS) * NEAR_MAX, sizeof *s->near, "scratch", e);
+		s->near = mem_new(most + RINGS * NEAR_MAX, sizeof *s->near, "scratch", e);
 		if (!s->stamp || !s->near)
 			return -1;
 	}

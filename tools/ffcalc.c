@@ -26,7 +26,7 @@ static const struct cli_option options[] = {
 	{ OPT_TO, "to", "WHAT", "elements or patches: what receives (default elements)" },
 	{ OPT_CLOSE, "close", NULL, "formulas to patches: change what is in doubt so that closed rows add up" },
 	{ OPT_GAIN, "emitter-gain", "N", "times as many rays for emitters (default 8)" },
-	{ OPT_GATHER, "gather", "N", "rays an element-side gathers with (default a sixteenth of -n)" },
+	{ OPT_GATHER, "gather", "N", "rays an element-side gathers with (default a sixteenth of -n, fewer for small elements)" },
 	{ OPT_LOBE_RAYS, "lobe-rays", "N", "rays a patch-side for each directional lobe (default 4096)" },
 	{ OPT_DEPTH, "depth", "N", "most ideal mirrors and panes a ray is followed through (default 256)" },
 	{ OPT_PRECISION, "precision", "TYPE", "f32 or f64 (default f32)" },
@@ -108,6 +108,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 	if (!hemicube) {
 		uint32_t least = o->method == FF_RAYS ? 0 : GATHER_LEAST;
 		o->rays = (o->rays + 3) / 4 * 4;
+		o->gather_by_area = gather < 0;
 		o->gather = gather >= 0 ? (uint32_t)gather
 		          : o->rays / 16 >= GATHER_LEAST ? o->rays / 16 : least;
 	}
@@ -127,8 +128,10 @@ static json_t *options_json(const struct ff_options *o)
 		"precision", o->f64 ? "f64" : "f32",
 		"part", (json_int_t)o->part, "parts", (json_int_t)o->parts);
 
-	if (o->method != FF_HEMICUBE)
+	if (o->method != FF_HEMICUBE) {
 		json_object_set_new(j, "gather", json_integer(o->gather));
+		json_object_set_new(j, "gather_by_area", json_boolean(o->gather_by_area));
+	}
 	json_object_set_new(j, "emitter_gain", json_integer(o->emitter_gain));
 	if (o->to_patches)
 		json_object_set_new(j, "to", json_string("patches"));

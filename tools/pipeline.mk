@@ -11,7 +11,8 @@ SHOOTFLAGS ?=
 TRACEFLAGS ?=
 TONEFLAGS ?=
 
-# How often the mesh is refined where the solution is in error. room.mesh is then made from
+# How often the mesh is refined where the solution is in error (to be set before this file is
+# included). room.mesh is then made from
 # room.pass0.rad, or with REFINE = 2 from room.pass1.rad, and so on; these earlier solutions
 # only tell where to refine, so theirs may be rough. A new paint or lamp can move the
 # refinement, and then costs new form factors.
