@@ -11,11 +11,10 @@ SHOOTFLAGS ?=
 TRACEFLAGS ?=
 TONEFLAGS ?=
 
-# How often the mesh is refined where the solution is in error (to be set before this file is
-# included). room.mesh is then made from
-# room.pass0.rad, or with REFINE = 2 from room.pass1.rad, and so on; these earlier solutions
-# only tell where to refine, so theirs may be rough. A new paint or lamp can move the
-# refinement, and then costs new form factors.
+# How often the mesh is refined where the solution is in error; to be set before this file is
+# included. room.mesh is then made from room.pass0.rad, or with REFINE = 2 from room.pass1.rad,
+# and so on. These earlier solutions only tell where to refine, so form factors of theirs may
+# be rough. A new paint or lamp can move the refinement, and then costs new form factors.
 REFINE ?= 0
 REFINEFLAGS ?=
 PASSFLAGS ?= -n 1024

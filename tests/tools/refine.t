@@ -17,13 +17,14 @@ import json, sys, chain
 print(json.loads(chain.container(sys.argv[1])[0]["report"])["refined"][sys.argv[2]])' "$@"
 }
 
-# shrinks FILE FILE…: the stated error of what each was made from is less than before.
+# shrinks FILE FILE…: the stated error of what each was made from is less than before, until
+# it is what is asked for.
 shrinks() {
 	last=1
 	for file; do
 		now=$(report "$file" error) || return 1
 		echo "$file: $now"
-		$PYTHON -c "import sys; sys.exit(not $now < $last)" || return 1
+		$PYTHON -c "import sys; sys.exit(not ($now < $last or $now <= .02))" || return 1
 		last=$now
 	done
 }
@@ -35,7 +36,7 @@ prepare solve 1
 check "and once more" mesh -q $coarse --refine 1.rad -o 2.mesh cornell.gltf
 prepare solve 2
 check "and again" mesh -q $coarse --refine 2.rad -o 3.mesh cornell.gltf
-check "the error shrinks" shrinks 1.mesh 2.mesh 3.mesh
+check "the error shrinks to what was asked for" shrinks 1.mesh 2.mesh 3.mesh
 check "the same again is up to date" sh -c \
 	"mesh $coarse --refine 0.rad -o 1.mesh cornell.gltf 2>&1 | grep 'up to date'"
 check "nothing to refine: the same elements" sh -c "
