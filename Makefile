@@ -4,6 +4,7 @@
 #   make demo       install what is missing, build, render the Cornell box
 #   make check      install what is missing, build, run all tests
 #   make check SAN=1  the same under ASan and UBSan, in build-san/
+#   make report     speed and accuracy, measured: build/report/index.html
 
 VERSION := 0.1.0
 CC ?= gcc
@@ -120,9 +121,15 @@ oracles: all
 bench: all $(BENCHES)
 	BUILD=$(abspath $(BUILD)) sh tests/bench/run.sh
 
-# The README's table and plot of speed against error; the yardsticks are kept.
+# One page of all that is measured, in less than 20 minutes; FULL=1: more, in hours.
+REPORT := BUILD='$(abspath $(BUILD))' CC='$(CC)' OPT='$(OPT)' PYTHON='$(PYTHON)' \
+	$(PYTHON) tests/bench/report $(if $(FULL),--full) --out
+report: all $(BUILD)/bench/rays
+	@$(REPORT) $(BUILD)/report
+
+# The README's table and plot of speed against error alone.
 report-table: all
-	BUILD=$(abspath $(BUILD)) $(PYTHON) tests/bench/report.py --work $(BUILD)/report --plot $(BUILD)/report
+	@$(REPORT) $(BUILD)/report-table --only speed
 
 # The README's table of form factors between patches.
 bench-form-factors: all $(BUILD)/bench/rays
@@ -148,7 +155,7 @@ install: all
 clean:
 	rm -rf build build-san out
 
-.PHONY: all unit deps demo check check-layers check-man oracles bench report-table bench-form-factors \
+.PHONY: all unit deps demo check check-layers check-man oracles bench report report-table bench-form-factors \
 	format install clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

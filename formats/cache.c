@@ -81,12 +81,22 @@ static void digest_materials(struct digest *d, const struct materials *mt)
 		}
 }
 
+static void digest_lights(struct digest *d, const struct lights *l)
+{
+	number(d, l->n);
+	digest_bytes(d, l->kind, l->n);
+	digest_bytes(d, l->position, l->n * 3 * sizeof *l->position);
+	digest_bytes(d, l->direction, l->n * 3 * sizeof *l->direction);
+	digest_bytes(d, l->cone, l->n * 2 * sizeof *l->cone);
+}
+
 static void geometry_id(const struct model *m, char hex[33])
 {
 	struct digest *d = digest_new();
 
 	number(d, (uint64_t)m->lobe);
 	digest_materials(d, &m->material);
+	digest_lights(d, &m->light);
 	const size_t counts[] = { m->surface.n, m->vertices, m->triangles, m->splits,
 	                          m->elements, m->patches, m->loops, m->loop_indices };
 	digest_bytes(d, counts, sizeof counts);
@@ -106,8 +116,9 @@ static void geometry_id(const struct model *m, char hex[33])
 	digest_end(d, hex);
 }
 
-static void material_id(const struct materials *mt, char hex[33])
+static void material_id(const struct model *m, char hex[33])
 {
+	const struct materials *mt = &m->material;
 	struct digest *d = digest_new();
 	const double *banded[] = { mt->rho_d, mt->tau_d, mt->rho_s, mt->tau_s, mt->emission };
 
@@ -115,6 +126,8 @@ static void material_id(const struct materials *mt, char hex[33])
 	number(d, (uint64_t)mt->bands);
 	for (size_t i = 0; i < sizeof banded / sizeof *banded; i++)
 		digest_bytes(d, banded[i], 2 * mt->n * (size_t)mt->bands * sizeof *banded[i]);
+	digest_bytes(d, m->light.intensity,
+	             m->light.n * (size_t)m->bands * sizeof *m->light.intensity);
 	digest_end(d, hex);
 }
 
@@ -135,7 +148,7 @@ void cache_ids(const struct model *m, struct cache_info *i)
 	struct digest *d = digest_new();
 
 	geometry_id(m, i->geometry_id);
-	material_id(&m->material, i->material_id);
+	material_id(m, i->material_id);
 	for (size_t c = 0; c < m->cameras; c++) {
 		char hex[33];
 		cache_camera_id(&m->camera[c], hex);

@@ -6,14 +6,14 @@
 #include "../lib/model.h"
 #include "container.h"
 
-#define CACHE_VERSION "1"    /* of .mesh and .rad files */
-#define CACHE_FF_VERSION "3" /* of .ff files */
+#define CACHE_VERSION "2"    /* of .mesh and .rad files */
+#define CACHE_FF_VERSION "4" /* of .ff files */
 
 /* Part of the key of each stage's output. To be raised whenever a stage makes something
  * else of the same input and options, so that what older programs left is made anew. */
-#define REVISION_MESH "2"
-#define REVISION_FF "5"
-#define REVISION_RAD "5"
+#define REVISION_MESH "3"
+#define REVISION_FF "6"
+#define REVISION_RAD "6"
 #define REVISION_VIEW "1"
 
 /* Strings are owned (malloc) and may be NULL. */
@@ -23,7 +23,7 @@ struct cache_info {
 	char *report;          /* what was modelled, counts, errors, as JSON */
 	char *key;             /* digest of inputs and options: equal keys, equal output */
 	char geometry_id[33];  /* all that form factors depend on */
-	char material_id[33];  /* coefficients and emission */
+	char material_id[33];  /* coefficients, emission, intensities of lights */
 	char camera_id[33];    /* all cameras */
 };
 
@@ -33,7 +33,8 @@ void cache_info_free(struct cache_info *i);
  * elements, split trees, patches, sides modelled, lobe kind, exponents, emission
  * exponents, which coefficients and emissions are non-zero (in any band), which
  * directional coefficients are 1 (in all bands), the
- * assignment of materials to surfaces; not names, coefficients, bands, UVs, NORMALs. */
+ * assignment of materials to surfaces, kinds, places, directions and cones of lights; not
+ * names, coefficients, intensities, bands, UVs, NORMALs. */
 void cache_ids(const struct model *m, struct cache_info *i);
 
 /* Digest of one camera (32 hex digits). */

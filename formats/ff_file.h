@@ -43,6 +43,7 @@ struct ff_file {
 	struct ff_scene scene;
 	size_t surfaces;
 	char **surface_name;       /* [surfaces] */
+	char **light_name;         /* [scene.lights] */
 	const uint32_t *patch_surface;
 	struct vec made;           /* void *: arrays that the file leaves out, see ff(5) */
 };

@@ -41,13 +41,15 @@ int ff_file_rename(const char *path, const struct model *m, struct err *e)
 	if (!c)
 		return -1;
 	if (same_names(c, "surfaces", m->surface.name, m->surface.n) &&
+	    same_names(c, "lights", m->light.name, m->light.n) &&
 	    same_names(c, "materials", mt->name, mt->n)) {
 		container_close(c);
 		return 0;
 	}
 	struct container_writer *w = container_verify_all(c, e) ? NULL : container_create(path, e);
 	if (w && !copy(w, c, e) && !cache_write_names(w, "materials", mt->name, mt->n, e) &&
-	    !cache_write_names(w, "surfaces", m->surface.name, m->surface.n, e))
+	    !cache_write_names(w, "surfaces", m->surface.name, m->surface.n, e) &&
+	    !cache_write_names(w, "lights", m->light.name, m->light.n, e))
 		status = container_finish(w, e) ? -1 : 1;
 	else
 		container_abandon(w);

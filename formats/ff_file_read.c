@@ -145,16 +145,18 @@ static int map_scene(struct ff_file *o, struct err *e)
 	struct ff_scene *s = &o->scene;
 	const struct container *c = o->container;
 	const uint64_t *counts = NULL;
-	const struct field number = { &counts, "model_counts", DT_U64, 1, { 4 } };
+	const struct field number = { &counts, "model_counts", DT_U64, 1, { 5 } };
 
 	if (fields_map(c, &number, 1, e))
 		return -1;
-	if (counts[0] >= INT32_MAX || counts[1] >= INT32_MAX || counts[2] >= INT32_MAX)
+	if (counts[0] >= INT32_MAX || counts[1] >= INT32_MAX || counts[2] >= INT32_MAX ||
+	    counts[4] >= INT32_MAX)
 		return container_refuse(c, e, "array model_counts: impossible");
 	s->patches = (size_t)counts[0];
 	s->elements = (size_t)counts[1];
 	s->materials = (size_t)counts[2];
 	o->surfaces = (size_t)counts[3];
+	s->lights = (size_t)counts[4];
 	o->patches = (uint32_t)counts[0];
 	const struct field field[] = {
 		{ &s->patch_area, "patch_area", DT_F64, 1, { s->patches } },
@@ -170,7 +172,8 @@ static int map_scene(struct ff_file *o, struct err *e)
 			return container_refuse(c, e, "array patch_surface: value %zu is %" PRIu32
 			                        " of %zu surfaces", p, o->patch_surface[p],
 			                        o->surfaces);
-	return cache_read_names(c, "surfaces", &o->surface_name, o->surfaces, e);
+	return cache_read_names(c, "surfaces", &o->surface_name, o->surfaces, e) ||
+	       cache_read_names(c, "lights", &o->light_name, s->lights, e) ? -1 : 0;
 }
 
 static int check_id(const struct ff_file *o, const struct cache_info *m_info, struct err *e)
@@ -183,6 +186,7 @@ static int check_patches(const struct ff_file *o, const struct model *m, struct 
 {
 	int other = m && (m->patches != o->scene.patches || m->elements != o->scene.elements ||
 	                  m->material.n != o->scene.materials ||
+	                  m->light.n != o->scene.lights ||
 	                  memcmp(m->patch_start, o->scene.patch_start,
 	                         (m->patches + 1) * sizeof *m->patch_start) != 0);
 
@@ -220,6 +224,7 @@ void ff_file_close(struct ff_file *f)
 		free(((void **)f->made.data)[i]);
 	free(f->made.data);
 	cache_names_free(f->surface_name, f->surfaces);
+	cache_names_free(f->light_name, f->scene.lights);
 	cache_info_free(&f->info);
 	container_close(f->container);
 	*f = (struct ff_file){ 0 };

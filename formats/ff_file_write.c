@@ -158,16 +158,17 @@ static int put_patches(struct ff_writer *w, const struct model *m, struct err *e
 /* Keeps what makes the file readable without its .mesh. */
 static int put_scene(struct ff_writer *w, const struct model *m, struct err *e)
 {
-	const uint64_t n = m->patches, four = 4;
-	const uint64_t counts[4] = { n, m->elements, m->material.n, m->surface.n };
+	const uint64_t n = m->patches, five = 5;
+	const uint64_t counts[5] = { n, m->elements, m->material.n, m->surface.n, m->light.n };
 
 	return container_put(w->container, "patch_area", DT_F64, 1, &n, m->patch_area, e) ||
-	       container_put(w->container, "model_counts", DT_U64, 1, &four, counts, e) ||
+	       container_put(w->container, "model_counts", DT_U64, 1, &five, counts, e) ||
 	       container_put(w->container, "patch_surface", DT_U32, 1, &n, m->patch_surface, e) ||
 	       put_patches(w, m, e) ||
 	       container_meta(w->container, "receivers", w->to_patches ? "patches" : "elements", e) ||
 	       cache_write_names(w->container, "materials", m->material.name, m->material.n, e) ||
-	       cache_write_names(w->container, "surfaces", m->surface.name, m->surface.n, e) ? -1 : 0;
+	       cache_write_names(w->container, "surfaces", m->surface.name, m->surface.n, e) ||
+	       cache_write_names(w->container, "lights", m->light.name, m->light.n, e) ? -1 : 0;
 }
 
 struct ff_writer *ff_file_create(const char *path, const struct model *m, int f64,

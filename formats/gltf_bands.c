@@ -109,6 +109,9 @@ static int all_grey(const struct palette *p)
 			    !grey(s->tau_s, w) || !grey(p->material[i].emission[k], w))
 				return 0;
 		}
+	for (size_t i = 0; i < p->m->light.n; i++)
+		if (!grey(p->m->light.intensity + RGB * i, RGB))
+			return 0;
 	return 1;
 }
 
@@ -163,6 +166,30 @@ static void store(const struct palette *p, size_t i, enum conversion how)
 	}
 }
 
+/* Lights have RGB intensities, whatever bands materials are read in. */
+static int store_lights(const struct palette *p, enum conversion how)
+{
+	struct lights *l = &p->m->light;
+	size_t bands = (size_t)p->m->bands;
+	double *rgb = l->intensity, *out = mem_new(l->n, bands * sizeof *out, "lights", p->e);
+
+	if (!out)
+		return -1;
+	for (size_t i = 0; i < l->n; i++) {
+		if (p->working != RGB && !grey(rgb + RGB * i, RGB)) {
+			free(out);
+			return err_set(p->e, "%s: light %s: its color is RGB but materials have %d "
+			               "bands; make it grey", p->g->source.path, l->name[i],
+			               p->working);
+		}
+		convert(rgb + RGB * i, p->working == RGB ? how : REPLICATE, p->m->bands,
+		        out + bands * i);
+	}
+	l->intensity = out;
+	free(rgb);
+	return 0;
+}
+
 int gltf_materials(struct gltf_reader *g, struct model *m, struct err *e)
 {
 	struct palette p = { .g = g, .m = m, .e = e,
@@ -176,7 +203,7 @@ int gltf_materials(struct gltf_reader *g, struct model *m, struct err *e)
 		goto out;
 	for (size_t i = 0; i < p.n; i++)
 		store(&p, i, how);
-	status = 0;
+	status = store_lights(&p, how);
 out:
 	for (size_t i = 0; p.material && i < p.n; i++)
 		free(p.material[i].name);

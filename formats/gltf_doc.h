@@ -8,6 +8,7 @@
  *   gltf_nodes.c     the node graph and its matrices
  *   gltf_material.c  a material
  *   gltf_bands.c     all materials of the scene            -> struct materials
+ *   gltf_lights.c    punctual lights                       -> struct lights
  *   gltf_scene.c     nodes: surfaces, triangles, cameras   -> struct model
  *   gltf_report.c    notes on what is not modelled
  */
@@ -184,8 +185,18 @@ uint32_t gltf_sparse_index(const struct gltf_elements *v, size_t k);
 
 /* ---- gltf_bands.c ---- */
 /* Fills m->material with the materials that surfaces of m use and renumbers them;
- * before, surfaces hold glTF's indices and UINT32_MAX for none. Sets m->bands. */
+ * before, surfaces hold glTF's indices and UINT32_MAX for none. Sets m->bands, and brings
+ * the intensities of lights, RGB before, to them. */
 int gltf_materials(struct gltf_reader *g, struct model *m, struct err *e);
+
+/* ---- gltf_lights.c ---- */
+#define GLTF_LIGHTS "KHR_lights_punctual"
+/* The file's array of lights, NULL if there is none. */
+json_t *gltf_lights_json(const json_t *root);
+/* Fills m->light with the lights of the nodes reached; intensities are RGB. world:
+ * [nodes][16]. 0, or -1 and e. */
+int gltf_lights(struct gltf_reader *g, struct model *m, const double *world,
+                const uint8_t *reached, struct err *e);
 
 /* ---- gltf_scene.c ---- */
 int gltf_scene(struct gltf_reader *g, struct model *m, struct err *e);

@@ -1,4 +1,5 @@
-/* Nodes with meshes to surfaces and triangles, nodes with cameras to cameras. */
+/* Nodes with meshes to surfaces and triangles, nodes with cameras to cameras, nodes with
+ * lights to lights. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -349,7 +350,7 @@ static int build(struct scene *s)
 	for (size_t i = 0; i < nodes; i++)
 		if (add_node(s, i))
 			return -1;
-	return add_cameras(s);
+	return add_cameras(s) || gltf_lights(s->g, s->m, s->world, s->reached, s->e) ? -1 : 0;
 }
 
 int gltf_scene(struct gltf_reader *g, struct model *m, struct err *e)

@@ -10,7 +10,8 @@
 enum kind {
 	ROOT, ASSET, BUFFER, VIEW, ACCESSOR, SPARSE, SPARSE_INDICES, SPARSE_VALUES, MESH,
 	PRIMITIVE, NODE, SCENE, CAMERA, PERSPECTIVE, ORTHOGRAPHIC, MATERIAL, PBR, TEXTURE,
-	MATERIAL_EXTENSIONS, TRANSMISSION, DIFFUSE_TRANSMISSION, IOR, SPECULAR, STRENGTH
+	MATERIAL_EXTENSIONS, TRANSMISSION, DIFFUSE_TRANSMISSION, IOR, SPECULAR, STRENGTH,
+	ROOT_EXTENSIONS, LIGHTS, LIGHT, SPOT, NODE_EXTENSIONS, LIGHT_OF_NODE
 };
 
 enum type {
@@ -26,7 +27,8 @@ struct rule {
 	const char *key;
 	enum type type;
 	int needed;
-	const char *text;  /* the choices, or the array that an index is for */
+	const char *text;  /* the choices, or the array that an index is for: of the root, or
+	                      "lights" */
 	double min, max;
 	size_t length;     /* of T_NUMBERS; T_INTEGER is a multiple of it; 0 = any */
 	enum kind of;      /* of objects */
@@ -34,6 +36,7 @@ struct rule {
 
 #define MAX_INTEGER 9007199254740992. /* 2^53, the spec's limit */
 #define MAX_INT32 2147483647.
+#define HALF_PI 1.5707965 /* rounded up: files have float32 numbers */
 
 #define INTEGER(in, key, needed, min, max) { in, key, T_INTEGER, needed, NULL, min, max, 0, ROOT }
 #define NUMBER(in, key, needed, min, max) { in, key, T_NUMBER, needed, NULL, min, max, 0, ROOT }
@@ -61,6 +64,7 @@ static const struct rule table[] = {
 	OBJECTS(ROOT, "nodes", 0, NODE),
 	OBJECTS(ROOT, "scenes", 0, SCENE),
 	INDEX(ROOT, "scene", 0, "scenes"),
+	OBJECT(ROOT, "extensions", 0, ROOT_EXTENSIONS),
 
 	STRING(ASSET, "version"),
 	STRING(ASSET, "minVersion"),
@@ -118,6 +122,7 @@ static const struct rule table[] = {
 	NUMBERS(NODE, "translation", 3, -INFINITY, INFINITY),
 	NUMBERS(NODE, "rotation", 4, -INFINITY, INFINITY),
 	NUMBERS(NODE, "scale", 3, -INFINITY, INFINITY),
+	OBJECT(NODE, "extensions", 0, NODE_EXTENSIONS),
 
 	STRING(SCENE, "name"),
 	INDICES(SCENE, "nodes", "nodes"),
@@ -158,6 +163,19 @@ static const struct rule table[] = {
 	OBJECT(SPECULAR, "specularTexture", 0, TEXTURE),
 	OBJECT(SPECULAR, "specularColorTexture", 0, TEXTURE),
 	NUMBER(STRENGTH, "emissiveStrength", 0, 0, INFINITY),
+
+	OBJECT(ROOT_EXTENSIONS, GLTF_LIGHTS, 0, LIGHTS),
+	OBJECTS(LIGHTS, "lights", 1, LIGHT),
+	STRING(LIGHT, "name"),
+	CHOICE(LIGHT, "type", 1, "point spot directional"),
+	NUMBERS(LIGHT, "color", 3, 0, INFINITY),
+	NUMBER(LIGHT, "intensity", 0, 0, INFINITY),
+	NUMBER(LIGHT, "range", 0, 0, INFINITY),
+	OBJECT(LIGHT, "spot", 0, SPOT),
+	NUMBER(SPOT, "innerConeAngle", 0, 0, HALF_PI),
+	NUMBER(SPOT, "outerConeAngle", 0, 0, HALF_PI),
+	OBJECT(NODE_EXTENSIONS, GLTF_LIGHTS, 0, LIGHT_OF_NODE),
+	INDEX(LIGHT_OF_NODE, "light", 1, "lights"),
 };
 
 enum { RULES = sizeof table / sizeof *table, PLACE = 256 };
@@ -245,7 +263,8 @@ static int check_string(const struct check *c, const struct place *at, const jso
 static int check_index(const struct check *c, const struct place *at, const json_t *v,
                        const struct rule *r)
 {
-	size_t n = json_array_size(json_object_get(c->root, r->text));
+	size_t n = json_array_size(strcmp(r->text, "lights") == 0
+	                           ? gltf_lights_json(c->root) : json_object_get(c->root, r->text));
 
 	if (!json_is_integer(v))
 		return refuse(c, at, "must be an integer");
@@ -389,7 +408,7 @@ static int check_version(const struct check *c)
 
 int gltf_schema_knows(const char *extension)
 {
-	if (strcmp(extension, "KHR_mesh_quantization") == 0)
+	if (strcmp(extension, "KHR_mesh_quantization") == 0 || strcmp(extension, GLTF_LIGHTS) == 0)
 		return 1;
 	for (size_t i = 0; i < RULES; i++)
 		if (table[i].in == MATERIAL_EXTENSIONS && strcmp(table[i].key, extension) == 0)

@@ -27,6 +27,7 @@ static size_t model_fields(struct model *m, struct field out[FIELDS_MAX])
 {
 	struct materials *mt = &m->material;
 	struct surfaces *s = &m->surface;
+	struct lights *l = &m->light;
 	const uint64_t mats = mt->n, b = (uint64_t)m->bands, t = m->triangles;
 	const struct field f[] = {
 		{ &mt->rho_d, "material_rho_d", DT_F64, 3, { mats, 2, b } },
@@ -40,6 +41,11 @@ static size_t model_fields(struct model *m, struct field out[FIELDS_MAX])
 		{ &mt->one_sided, "material_one_sided", DT_U8, 1, { mats } },
 		{ &s->material, "surface_material", DT_U32, 1, { s->n } },
 		{ &s->has_normals, "surface_has_normals", DT_U8, 1, { s->n } },
+		{ &l->position, "light_position", DT_F64, 2, { l->n, 3 } },
+		{ &l->direction, "light_direction", DT_F64, 2, { l->n, 3 } },
+		{ &l->cone, "light_cone", DT_F64, 2, { l->n, 2 } },
+		{ &l->intensity, "light_intensity", DT_F64, 2, { l->n, b } },
+		{ &l->kind, "light_kind", DT_U8, 1, { l->n } },
 		{ &m->vertex, "vertex", DT_F64, 2, { m->vertices, 3 } },
 		{ &m->triangle, "triangle", DT_U32, 2, { t, 3 } },
 		{ &m->triangle_surface, "triangle_surface", DT_U32, 1, { t } },
@@ -146,7 +152,8 @@ int mesh_put_model(struct container_writer *w, const struct model *m, struct err
 	       put_cameras(w, m, e) ||
 	       container_meta(w, "lobe", m->lobe == LOBE_PAPER ? "paper" : "reciprocal", e) ||
 	       cache_write_names(w, "materials", m->material.name, m->material.n, e) ||
-	       cache_write_names(w, "surfaces", m->surface.name, m->surface.n, e) ? -1 : 0;
+	       cache_write_names(w, "surfaces", m->surface.name, m->surface.n, e) ||
+	       cache_write_names(w, "lights", m->light.name, m->light.n, e) ? -1 : 0;
 }
 
 int mesh_file_write(const char *path, const struct model *m, const struct cache_info *i,
@@ -174,6 +181,7 @@ static int get_counts(const struct container *c, struct model *m, struct err *e)
 	if (fields_size(c, "material_rho_d", DT_F64, 3, 0, &m->material.n, e) ||
 	    fields_size(c, "material_rho_d", DT_F64, 3, 2, &bands, e) ||
 	    fields_size(c, "surface_material", DT_U32, 1, 0, &m->surface.n, e) ||
+	    fields_size(c, "light_kind", DT_U8, 1, 0, &m->light.n, e) ||
 	    fields_size(c, "camera_to_world", DT_F64, 2, 0, &m->cameras, e) ||
 	    fields_size(c, "vertex", DT_F64, 2, 0, &m->vertices, e) ||
 	    fields_size(c, "triangle", DT_U32, 2, 0, &m->triangles, e) ||
@@ -235,6 +243,7 @@ int mesh_get_model(const struct container *c, struct model *m, struct err *e)
 	    fields_copy(c, f, model_fields(m, f), e) ||
 	    cache_read_names(c, "materials", &m->material.name, m->material.n, e) ||
 	    cache_read_names(c, "surfaces", &m->surface.name, m->surface.n, e) ||
+	    cache_read_names(c, "lights", &m->light.name, m->light.n, e) ||
 	    get_cameras(c, m, e))
 		goto failed;
 	if (model_check(m, &why)) {

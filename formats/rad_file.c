@@ -28,7 +28,7 @@ static size_t solution_fields(struct solution *s, struct plain *plain,
 		{ &s->error, "irradiance_error", DT_F64, 2, { sides, b } },
 		{ &s->error_direct, "irradiance_error_direct", DT_F64, 2, { sides, b } },
 		{ &s->discretisation, "irradiance_discretisation", DT_F64, 2, { sides, b } },
-		{ &s->unshot_emission, "unshot_emission", DT_F64, 2, { s->patch_sides, b } },
+		{ &s->unshot_emission, "unshot_emission", DT_F64, 2, { s->sources, b } },
 		{ &s->unshot_diffuse, "unshot_diffuse", DT_F64, 3, { s->patch_sides, g, b } },
 		{ &s->unshot_link, "unshot_link", DT_F64, 4, { s->links, 2, g, b } },
 		{ &s->shot, "shot", DT_F64, 4, { s->rows, 2, g, b } },
@@ -82,7 +82,8 @@ static int get_solution(const struct container *c, const struct model *m,
 	int failed;
 
 	*s = (struct solution){ .bands = m->bands, .element_sides = 2 * m->elements,
-	                        .patch_sides = 2 * m->patches, .emitters = m->material.n };
+	                        .patch_sides = 2 * m->patches, .sources = model_sources(m),
+	                        .emitters = m->material.n + m->light.n };
 	if (fields_size(c, "irradiance_direct", DT_F64, 3, 0, &s->groups, e) ||
 	    fields_size(c, "unshot_link", DT_F64, 4, 0, &s->links, e) ||
 	    fields_size(c, "shot", DT_F64, 4, 0, &s->rows, e))

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 
 #include "bsdf.h"
+#include "light.h"
 #include "mem.h"
 
 /* Albedos beyond this count as 1: no light is absorbed. */
@@ -40,7 +41,7 @@ static int passes(const struct model *m, uint32_t patch)
 
 int components_init(struct components *c, const struct transport *t, struct err *e)
 {
-	uint32_t sides = 2 * (uint32_t)t->m->patches;
+	uint32_t sides = model_sources(t->m);
 
 	*c = (struct components){ 0 };
 	if (!(c->of = mem_new(sides, sizeof *c->of, "components", e)))
@@ -153,6 +154,15 @@ static void start_at_emitters(struct ends *x)
 		                  (int)(ps & 1), x->band) > 0)
 			x->reached[row] = 1;
 	}
+	for (size_t i = 0; i < t->m->light.n; i++)
+		if (t->light_row[i] != FF_NO_ROW && light_flux(t->m, i, x->band) > 0)
+			x->reached[t->light_row[i]] = 1;
+}
+
+static const char *source_name(const struct model *m, uint32_t source)
+{
+	return source < 2 * m->patches ? m->surface.name[m->patch_surface[source >> 1]]
+	                               : m->light.name[source - 2 * m->patches];
 }
 
 static int band_ends(struct ends *x, struct err *e)
@@ -177,7 +187,7 @@ static int band_ends(struct ends *x, struct err *e)
 			return err_set(e, "no steady state: light in band %d that reaches %s can "
 			               "neither be absorbed nor leave; lower an albedo of that "
 			               "closed part below 1 or open it", x->band,
-			               t->m->surface.name[t->m->patch_surface[t->row_side[r] >> 1]]);
+			               source_name(t->m, t->row_side[r]));
 	return 0;
 }
 

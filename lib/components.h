@@ -6,7 +6,7 @@
 
 struct components {
 	uint32_t n;
-	uint32_t *of;        /* [2P] component of a patch-side */
+	uint32_t *of;        /* [2P+L] component of a patch-side or light */
 };
 
 /* Patch-sides joined by any row, or by transmission through the patch itself.

@@ -2,7 +2,8 @@
  *
  * A ROW is a distribution of flux leaving one patch-side: where it first lands,
  * and where it lands after each chain of ideal mirrors and clear panes.
- * Patch-side = 2 patch + side, element-side = 2 element + side.
+ * Patch-side = 2 patch + side, element-side = 2 element + side. A punctual light is a
+ * source too, numbered behind the patch-sides: 2 patches + light.
  *
  * A BLOCK of a row is what arrives by one CHAIN: the multiset of ideal events
  * passed on the way (chain 0: none). Values are colourless fractions of the
@@ -35,7 +36,9 @@ enum ff_row_kind {
 	FF_DIFFUSE = 0,     /* Lambertian, one for each patch-side that can shoot */
 	FF_EMISSION = 1,    /* cos^m lobe about the normal (emission_exponent != 1) */
 	FF_REFLECTED = 2,   /* G about R for one link */
-	FF_TRANSMITTED = 3  /* G about T for one link */
+	FF_TRANSMITTED = 3, /* G about T for one link */
+	FF_LIGHT = 4,       /* of a punctual light: of all its flux, see light.h */
+	FF_ROW_KINDS
 };
 
 struct ff {
@@ -48,7 +51,7 @@ struct ff {
 	uint32_t *chain_event, *chain_count;
 
 	size_t rows;
-	uint32_t *row_side;       /* patch-side the flux leaves */
+	uint32_t *row_side;       /* patch-side, or light, that the flux leaves */
 	uint8_t *row_kind;
 	uint32_t *row_samples;    /* rays or hemicube pixels spent on block 0, or as
 	                             many independent rays as gathered values are worth;
@@ -87,13 +90,14 @@ struct ff {
 
 	size_t links;
 	uint32_t *link_target;    /* ascending; then by chain, source */
-	uint32_t *link_source;    /* first patch-side, or FF_ANY */
-	uint32_t *link_last;      /* last patch-side (the same), or FF_ANY */
+	uint32_t *link_source;    /* first patch-side, or a light, or FF_ANY */
+	uint32_t *link_last;      /* last patch-side (the same for light), or FF_ANY */
 	uint32_t *link_chain;
 	float *link_direction;    /* [links][3] mean direction to the source */
 	uint32_t *link_row;       /* [links][2] rows about R and T, or FF_NO_ROW */
 
-	/* The shard: patches [patch_begin, patch_end) leave through these rows. */
+	/* The shard: patches [patch_begin, patch_end), and as large a part of the lights,
+	 * leave through these rows. */
 	uint32_t patch_begin, patch_end;
 	uint32_t part, parts;     /* K/N, 1-based */
 };

@@ -44,6 +44,8 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 	                  bsdf_has_lobe(mt, material, side, 1);
 	j->is_ideal[ps] = bsdf_has_ideal(mt, material, side, 0) ||
 	                  bsdf_has_ideal(mt, material, side, 1);
+	j->has_panes |= bsdf_has_ideal(mt, material, side, 1);
+	j->has_ideal |= j->is_ideal[ps];
 	j->is_source[ps] = j->shoots_diffuse[ps] || j->shoots_lobe[ps] ||
 	                   bsdf_has_lobe(mt, material, side, 0) ||
 	                   bsdf_has_lobe(mt, material, !side, 1);
@@ -163,12 +165,14 @@ static int job_init(struct ff_job *j, const struct model *m, const struct ff_opt
 }
 
 /* What rows that are computed one by one need beside. */
-static int prepare_rows(struct ff_job *j, struct err *e)
+static int prepare_rows(struct ff_job *j, int patches, struct err *e)
 {
-	if (j->o.method == FF_HEMICUBE && (hemi_grid_init(&j->grid, (int)j->o.rays, e) ||
-	                                   !(j->cubes = hemi_scene_new(j->m, e))))
+	int formula = patches && by_formula(&j->o), cubes = patches && j->o.method == FF_HEMICUBE;
+
+	if (cubes && (hemi_grid_init(&j->grid, (int)j->o.rays, e) ||
+	              !(j->cubes = hemi_scene_new(j->m, e))))
 		return -1;
-	if (by_formula(&j->o) && ff_formula_init(&j->formula, j->m, j->o.method == FF_ANALYTIC, e))
+	if (formula && ff_formula_init(&j->formula, j->m, j->o.method == FF_ANALYTIC, e))
 		return -1;
 	return make_samples(j, e) || make_places(j, e) ? -1 : 0;
 }
@@ -222,12 +226,13 @@ static void thread_free(struct ff_thread *t)
 	free(t->formula);
 	free(t->captures.data);
 	free(t->sights.data);
+	free(t->lit.data);
 	free(t->item);
 	free(t->view);
 	free(t->chain_map.data);
 }
 
-/* ---- the loop over patches ---- */
+/* ---- the loop over patches, and then lights ---- */
 
 struct run {
 	const struct ff_job *job;
@@ -243,9 +248,11 @@ static void do_patches(void *arg, size_t begin, size_t end, int thread)
 	struct run *r = arg;
 
 	for (size_t i = begin; i < end; i++) {
-		uint32_t patch = r->first + (uint32_t)i;
+		uint32_t patch = r->first + (uint32_t)i, patches = (uint32_t)r->job->m->patches;
 		r->owner[i] = thread;
-		if (r->job->o.method == FF_HEMICUBE)
+		if (patch >= patches)
+			ff_light_row(&r->thread[thread], patch - patches, &r->batch[i], &r->err[i]);
+		else if (r->job->o.method == FF_HEMICUBE)
 			ff_patch_hemicube(&r->thread[thread], patch, &r->batch[i], &r->err[i]);
 		else
 			ff_patch_rays(&r->thread[thread], patch, &r->batch[i], &r->err[i]);
@@ -330,6 +337,7 @@ static int gather(struct ff_job *j, struct ff_stats *stats, const struct progres
 	return ff_gather(j, &stats->rays, &inner, e);
 }
 
+/* Patches [begin, end), or lights, numbered behind the patches. */
 static int all_patches(struct run *r, uint32_t begin, uint32_t end, struct chains *whole,
                        struct ff_stats *stats, const struct ff_sink *sink,
                        const struct progress *progress, struct err *e)
@@ -345,6 +353,23 @@ static int all_patches(struct run *r, uint32_t begin, uint32_t end, struct chain
 			return -1;
 	}
 	return 0;
+}
+
+/* Where the k-th of `parts` equal shares of n ends. */
+static uint32_t share(size_t n, uint32_t k, uint32_t parts)
+{
+	return (uint32_t)((uint64_t)n * k / parts);
+}
+
+static int all_lights(struct run *r, struct chains *whole, struct ff_stats *stats,
+                      const struct ff_sink *sink, struct err *e)
+{
+	const struct ff_options *o = &r->job->o;
+	size_t lights = r->job->m->light.n;
+	uint32_t patches = (uint32_t)r->job->m->patches;
+
+	return all_patches(r, patches + share(lights, o->part - 1, o->parts),
+	                   patches + share(lights, o->part, o->parts), whole, stats, sink, NULL, e);
 }
 
 /* ---- the chain table of the file ---- */
@@ -387,15 +412,15 @@ static void count_curved(const struct ff_job *j, struct ff_stats *s)
 	}
 }
 
-/* All rows, one after the other. */
-static int build_rows(struct ff_job *j, struct ff *whole, struct ff_stats *stats,
+/* All rows, one after the other; without `patches` those of lights only. */
+static int build_rows(struct ff_job *j, int patches, struct ff *whole, struct ff_stats *stats,
                       const struct ff_sink *sink, const struct progress *progress,
                       struct err *e)
 {
 	int threads = j->o.threads > 0 ? j->o.threads : 1;
 	struct chains chains = { 0 };
 	struct run run = { .job = j };
-	int bad = prepare_rows(j, e) || chains_init(&chains, j->m, e);
+	int bad = prepare_rows(j, patches, e) || chains_init(&chains, j->m, e);
 
 	run.thread = mem_new((size_t)threads, sizeof *run.thread, "threads", e);
 	run.batch = mem_new(PATCHES_AT_A_TIME, sizeof *run.batch, "batches", e);
@@ -406,9 +431,11 @@ static int build_rows(struct ff_job *j, struct ff *whole, struct ff_stats *stats
 		bad = thread_init(&run.thread[t], j, e);
 	for (size_t i = 0; !bad && i < PATCHES_AT_A_TIME; i++)
 		run.batch[i].f64 = j->o.f64;
-	bad = bad || gather(j, stats, progress, e) ||
-	      all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats, sink,
-	                  progress, e) || put_chains(whole, &chains, e);
+	if (patches)
+		bad = bad || gather(j, stats, progress, e) ||
+		      all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats, sink,
+		                  progress, e);
+	bad = bad || all_lights(&run, &chains, stats, sink, e) || put_chains(whole, &chains, e);
 	for (int t = 0; run.thread && t < threads; t++) {
 		stats->rays += run.thread[t].rays;
 		if (run.thread[t].formula)
@@ -423,11 +450,14 @@ static int build_rows(struct ff_job *j, struct ff *whole, struct ff_stats *stats
 	return bad ? -1 : 0;
 }
 
-/* The matrix between patches, whose rows have no chains. */
-static int build_matrix(const struct ff_job *j, struct ff *whole, struct ff_stats *stats,
+/* The matrix between patches, whose rows have no chains, and the rows of lights. */
+static int build_matrix(struct ff_job *j, struct ff *whole, struct ff_stats *stats,
                         const struct ff_sink *sink, const struct progress *progress,
                         struct err *e)
 {
+	if (j->m->light.n)
+		return ff_matrix(j, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
+		       build_rows(j, 0, whole, stats, sink, progress, e) ? -1 : 0;
 	whole->chains = 1;
 	whole->chain_start = mem_new(2, sizeof *whole->chain_start, "chains", e);
 	return whole->chain_start ? ff_matrix(j, whole->patch_begin, whole->patch_end, sink, stats,
@@ -444,8 +474,8 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 
 	*stats = (struct ff_stats){ 0 };
 	*whole = (struct ff){ .part = o->part, .parts = o->parts };
-	whole->patch_begin = (uint32_t)((uint64_t)m->patches * (o->part - 1) / o->parts);
-	whole->patch_end = (uint32_t)((uint64_t)m->patches * o->part / o->parts);
+	whole->patch_begin = share(m->patches, o->part - 1, o->parts);
+	whole->patch_end = share(m->patches, o->part, o->parts);
 	if (!bad && o->close && !matrix)
 		bad = err_set(e, "--close needs factors to patches by formula (-m auto --to patches) "
 		              "in a model without lobes, mirrors and panes");
@@ -453,7 +483,7 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 		count_curved(&job, stats);
 	if (!bad)
 		bad = matrix ? build_matrix(&job, whole, stats, sink, progress, e)
-		             : build_rows(&job, whole, stats, sink, progress, e);
+		             : build_rows(&job, 1, whole, stats, sink, progress, e);
 	if (stats->rows[FF_DIFFUSE])
 		stats->mean_error /= (double)stats->rows[FF_DIFFUSE];
 	job_free(&job);

@@ -32,7 +32,7 @@ struct ff_options {
 struct ff_stats {
 	double rays;          /* traced, all kinds */
 	double samples;       /* rays or pixels spent on diffuse rows */
-	size_t rows[4];       /* by kind */
+	size_t rows[FF_ROW_KINDS]; /* by kind */
 	size_t links, blocks, entries;
 	double worst_residual;/* largest |raw 1 - sum| of a row */
 	double mean_error;    /* mean and largest standard error of the diffuse rows */

@@ -92,15 +92,23 @@ static uint64_t chain_length(const struct ff *f, uint32_t chain)
 
 /* ---- rows and blocks ---- */
 
-static int check_row(const struct ff *f, size_t r, struct err *e)
+static size_t sources(const struct ff_scene *s)
 {
-	uint32_t patch = f->row_side[r] >> 1;
+	return 2 * s->patches + s->lights;
+}
 
-	if (patch < f->patch_begin || patch >= f->patch_end)
+static int check_row(const struct ff *f, const struct ff_scene *s, size_t r, struct err *e)
+{
+	uint32_t source = f->row_side[r], patch = source >> 1;
+
+	if (f->row_kind[r] >= FF_ROW_KINDS)
+		return err_set(e, "array row_kind: value %zu is %d", r, f->row_kind[r]);
+	if (f->row_kind[r] == FF_LIGHT && (patch < s->patches || source >= sources(s)))
+		return err_set(e, "array row_side: row %zu leaves source %" PRIu32 ", which is no "
+		               "light", r, source);
+	if (f->row_kind[r] != FF_LIGHT && (patch < f->patch_begin || patch >= f->patch_end))
 		return err_set(e, "array row_side: row %zu leaves patch %" PRIu32 ", which is not "
 		               "in this part", r, patch);
-	if (f->row_kind[r] > FF_TRANSMITTED)
-		return err_set(e, "array row_kind: value %zu is %d", r, f->row_kind[r]);
 	if (!(f->row_scale[r] > 0 && isfinite(f->row_scale[r])))
 		return err_set(e, "array row_scale: value %zu is %g", r, f->row_scale[r]);
 	if (!isfinite(f->row_residual[r]))
@@ -125,7 +133,7 @@ static int check_row_chains(const struct ff *f, size_t r, struct err *e)
 	return 0;
 }
 
-static int check_rows(const struct ff *f, struct err *e)
+static int check_rows(const struct ff *f, const struct ff_scene *s, struct err *e)
 {
 	if (check_starts("row_block", f->row_block, f->rows, f->blocks, 1, e) ||
 	    check_starts("block_start", f->block_start, f->blocks, f->entries, 0, e) ||
@@ -138,7 +146,7 @@ static int check_rows(const struct ff *f, struct err *e)
 	    not_negative("block_cut", f->block_cut, f->blocks, e))
 		return -1;
 	for (size_t r = 0; r < f->rows; r++)
-		if (check_row(f, r, e) || check_row_chains(f, r, e))
+		if (check_row(f, s, r, e) || check_row_chains(f, r, e))
 			return -1;
 	return 0;
 }
@@ -317,18 +325,18 @@ static int link_order(const struct ff *f, size_t l)
 	return f->link_source[l] == FF_ANY;
 }
 
-static int check_links(const struct ff *f, size_t patches, struct err *e)
+static int check_links(const struct ff *f, const struct ff_scene *s, struct err *e)
 {
-	if (check_below("link_target", f->link_target, f->links, 2 * patches, e) ||
+	if (check_below("link_target", f->link_target, f->links, 2 * s->patches, e) ||
 	    check_below("link_chain", f->link_chain, f->links, f->chains, e) ||
 	    unit_vectors("link_direction", f->link_direction, f->links, e))
 		return -1;
 	for (size_t l = 0; l < f->links; l++) {
-		if (f->link_source[l] != FF_ANY && f->link_source[l] >= 2 * patches)
+		if (f->link_source[l] != FF_ANY && f->link_source[l] >= sources(s))
 			return err_set(e, "array link_source: value %zu is %" PRIu32, l,
 			               f->link_source[l]);
 		if (f->link_last[l] < f->link_source[l] ||
-		    (f->link_source[l] != FF_ANY && f->link_last[l] >= 2 * patches))
+		    (f->link_source[l] != FF_ANY && f->link_last[l] >= sources(s)))
 			return err_set(e, "array link_last: value %zu is %" PRIu32, l,
 			               f->link_last[l]);
 		if (l && !link_order(f, l))
@@ -352,9 +360,9 @@ static int check_part(const struct ff *f, size_t patches, struct err *e)
 int ff_check(const struct ff *f, const struct ff_scene *s, struct err *e)
 {
 	return check_scene(s, e) || check_part(f, s->patches, e) ||
-	       check_chains(f, s->materials, e) || check_rows(f, e) ||
+	       check_chains(f, s->materials, e) || check_rows(f, s, e) ||
 	       check_entries(f, s, e) ||
 	       check_below("arrival_target", f->arrival_target, f->arrivals, 2 * s->patches, e) ||
 	       unit_vectors("arrival_direction", f->arrival_direction, f->arrivals, e) ||
-	       check_links(f, s->patches, e) ? -1 : 0;
+	       check_links(f, s, e) ? -1 : 0;
 }

@@ -6,7 +6,7 @@
 
 /* The model form factors were made for, as far as reading them needs it. */
 struct ff_scene {
-	size_t patches, elements, materials;
+	size_t patches, elements, materials, lights;
 	const uint32_t *patch_start;  /* [patches+1] */
 	const double *patch_area;     /* [patches] */
 	const uint8_t *patch_sides;   /* [patches] bit 0: front modelled, bit 1: back */

@@ -68,6 +68,7 @@ struct ff_job {
 	uint8_t *has_lobe;        /* [2P] light arriving here leaves by a finite lobe */
 	uint8_t *emits;           /* [2P] gives light of its own */
 	uint8_t *is_source;       /* [2P] any light leaves here */
+	int has_panes, has_ideal; /* any clear pane; any ideal surface */
 	struct ff_samples of_rows[2], of_gathering[2]; /* for as many rays as most cast, and for
 	                                                  fewer */
 	struct tally_places places;
@@ -106,12 +107,15 @@ struct ff_thread {
 	struct vec captures;      /* struct capture */
 	int capturing;
 	double capture_weight;    /* of a capture, per weight of the ray */
+	int bent_only;            /* landings of light that came straight are known */
+	double turned;            /* weight of the others, then */
 	struct capture now;       /* the sample being followed, while capturing */
 	struct hemicube cube;
 	uint32_t *item;           /* hemicube: [points][2 sides][pixels] of the patch */
 	struct view *view;        /* hemicube: [points][2 sides] */
 	double rays;
 	struct vec sights;        /* struct ff_sight */
+	struct vec lit;           /* struct lit, of the light in work */
 	struct exchanger *formula; /* NULL: nothing is computed by formula */
 	struct ff_batch_rays lobe; /* lobe rays waiting to be cast */
 	uint32_t lobes;
@@ -160,6 +164,9 @@ void ff_batch_from_element(const struct ff_job *j, const struct ff_samples *s,
 /* Unit normal of a side of an element. */
 void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3]);
 
+/* Where a hit lies, from the triangle's corners: exact to the rounding of doubles. */
+void ff_hit_point(const struct model *m, const struct ray_hit *hit, double x[3]);
+
 /* Follows a ray (origin already off its surface) carrying weight w of the row's
  * flux to where it lands, and on through ideal surfaces; tallies everything. */
 void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], double w,
@@ -207,6 +214,20 @@ int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_w
 /* All rows of one patch into the batch. 0, or -1 and e. */
 int ff_patch_rays(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
 int ff_patch_hemicube(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
+
+/* The row of a punctual light into the batch; none if it has no flux. 0, or -1 and e.
+ * O(elements + rays). */
+int ff_light_row(struct ff_thread *t, uint32_t light, struct ff_batch *b, struct err *e);
+
+/* Captures the ways that light of all punctual lights comes straight to a directional
+ * patch-side. O(lights). 0, or -1 and e. */
+int ff_light_captures(struct ff_thread *t, uint32_t patch_side, struct err *e);
+
+/* 1 if a source gives light of its own. */
+static inline int ff_emits(const struct ff_job *j, uint32_t source)
+{
+	return source >= 2 * j->m->patches || j->emits[source];
+}
 
 /* Casts one lobe direction from a capture's point off a side. */
 typedef void ff_cast_fn(struct ff_thread *t, const struct capture *c, int side,

@@ -258,7 +258,7 @@ static size_t cluster_end(const struct ff_job *j, const struct capture *c, size_
 	while (end < n && c[end].chain == c[i].chain) {
 		uint32_t source = c[end].source;
 		if (source != c[i].source &&
-		    (*w >= enough || j->emits[source] || j->emits[c[i].source] ||
+		    (*w >= enough || ff_emits(j, source) || ff_emits(j, c[i].source) ||
 		     v3_dot(c[end].l, c[i].l) < narrow))
 			break;
 		while (end < n && c[end].chain == c[i].chain && c[end].source == source)
@@ -272,7 +272,7 @@ static size_t cluster_end(const struct ff_job *j, const struct capture *c, size_
 static uint32_t cluster_rays(const struct ff_job *j, const struct capture *c, double share,
                              size_t emitters)
 {
-	double rays = j->emits[c->source]
+	double rays = ff_emits(j, c->source)
 	            ? (double)j->o.lobe_rays * j->o.emitter_gain / (double)emitters
 	            : fmin(1, share) * j->o.lobe_rays;
 
@@ -285,7 +285,7 @@ static size_t count_emitters(const struct ff_job *j, const struct capture *c, si
 	size_t emitters = 0;
 
 	for (size_t i = 0; i < n; i++)
-		emitters += j->emits[c[i].source] &&
+		emitters += (size_t)ff_emits(j, c[i].source) &&
 		            (i == 0 || c[i].source != c[i - 1].source || c[i].chain != c[i - 1].chain);
 	return emitters;
 }
@@ -306,7 +306,8 @@ int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch
 		if (c[i].chain == 0)
 			met[c[i].source] = 1;
 	}
-	bad = bad || probe_unseen(t, ps, met, e) || sort_captures(t, e);
+	bad = bad || probe_unseen(t, ps, met, e) || ff_light_captures(t, ps, e) ||
+	      sort_captures(t, e);
 	free(met);
 	c = t->captures.data;
 	if (!bad)

@@ -13,6 +13,7 @@ struct flight {
 	uint32_t chain;
 	uint32_t passed;   /* ideal surfaces so far */
 	int tallied;       /* its landing is known already */
+	int bent;          /* it has been turned on its way */
 	int splits;
 };
 
@@ -29,8 +30,7 @@ static void capture(struct ff_thread *t, uint32_t source, uint32_t chain, double
 		vec_append(&t->captures, &c, 1, sizeof c, &t->tally.err);
 }
 
-/* Where a hit lies, from the triangle's corners: exact to the rounding of doubles. */
-static void hit_point(const struct model *m, const struct ray_hit *hit, double x[3])
+void ff_hit_point(const struct model *m, const struct ray_hit *hit, double x[3])
 {
 	const uint32_t *corner = &m->triangle[3 * (size_t)hit->triangle];
 
@@ -58,7 +58,7 @@ static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_
 		return 0;
 	}
 	ff_normal(t->job, element, transmitted ? !hit->side : hit->side, n);
-	hit_point(t->job->m, hit, out->org);
+	ff_hit_point(t->job->m, hit, out->org);
 	for (int k = 0; k < 3; k++)
 		out->dir[k] = in->dir[k];
 	if (!transmitted)
@@ -68,6 +68,7 @@ static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_
 	out->chain = chain;
 	out->passed = in->passed + 1;
 	out->tallied = 0;
+	out->bent = in->bent || !transmitted;
 	return 1;
 }
 
@@ -100,18 +101,20 @@ static int land(struct ff_thread *t, const struct flight *f, const struct ray_hi
 	const struct ff_job *j = t->job;
 
 	t->rays++;
+	t->turned += t->bent_only && f->bent ? f->w : 0;
 	if (hit->triangle == RAY_MISS) {
 		if (!f->tallied)
 			tally_rest(&t->tally, f->chain)->escape += f->w;
 		return 0;
 	}
 	uint32_t side = (uint32_t)hit->side, ps = 2 * j->m->element_patch[element] + side;
+	int known = f->tallied || (t->bent_only && !f->bent);
 	if (j->is_black[ps]) {
-		if (!f->tallied)
+		if (!known)
 			tally_rest(&t->tally, f->chain)->black += f->w;
 		return 0;
 	}
-	if (!f->tallied)
+	if (!known)
 		tally_hit(&t->tally, f->chain, 2 * element + side, f->w, f->dir);
 	if (t->capturing)
 		capture(t, ps, f->chain, f->w);

@@ -300,7 +300,7 @@ static double share_variance(const struct tally *t, double sum, double square, d
 
 	if (t->replicates >= 2)
 		return fmax(0, square - sum * sum / r) / (r - 1) * r / (total * total);
-	return f * (1 - f) / samples;
+	return samples ? f * (1 - f) / samples : 0;
 }
 
 static int put_arrival(struct ff_batch *b, uint32_t target, const double toward[3],
@@ -500,7 +500,7 @@ int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
 		return -1;
 	clear(t);
 	/* All samples in one place tell no more than a sample's weight. */
-	double error = fmax(sqrt(f.variance), 1. / samples);
+	double error = samples ? fmax(sqrt(f.variance), 1. / samples) : 0;
 	struct batch_row row = { row_side, kind, samples, f.sum > 0 ? 1 / f.sum : 0,
 	                         1 - f.sum / total, error };
 	return batch_put_row(b, &row, e);

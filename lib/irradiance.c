@@ -205,7 +205,9 @@ static void add_range(void *arg, size_t begin, size_t end, int thread)
 
 static enum part part_of(const struct transport *t, uint32_t row, uint32_t chain)
 {
-	return chain == 0 && t->row_kind[row] <= FF_EMISSION ? DIRECT : CAUSTIC;
+	int directional = t->row_kind[row] == FF_REFLECTED || t->row_kind[row] == FF_TRANSMITTED;
+
+	return chain == 0 && !directional ? DIRECT : CAUSTIC;
 }
 
 /* Variance of an element's irradiance, all groups together, from the sampling of the

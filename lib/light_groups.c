@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "lanes.h"
+#include "light.h"
 #include "mem.h"
 
 /* ---- who is in which ---- */
@@ -18,6 +19,14 @@ static int emits(const struct model *m, uint32_t material)
 
 	for (size_t k = 0; k < (mt->one_sided[material] ? n : 2 * n); k++)
 		if (mt->emission[at + k] > 0)
+			return 1;
+	return 0;
+}
+
+static int shines(const struct model *m, uint32_t light)
+{
+	for (int k = 0; k < m->bands; k++)
+		if (light_flux(m, light, k) > 0)
 			return 1;
 	return 0;
 }
@@ -54,18 +63,20 @@ int light_groups_set(struct solution *s, const struct model *m, int apart, struc
 	const size_t most = CHANNELS_MAX / (size_t)m->bands;
 	size_t groups = 0;
 
-	s->emitters = m->material.n;
+	s->emitters = m->material.n + m->light.n;
 	s->emitter_group = mem_new(s->emitters, sizeof *s->emitter_group, "light groups", e);
 	s->group_name = mem_new(s->emitters + 1, sizeof *s->group_name, "light groups", e);
 	s->groups = 1;
 	if (!s->emitter_group || !s->group_name)
 		return -1;
-	for (uint32_t i = 0; apart && i < m->material.n; i++) {
-		if (!emits(m, i) || !is_used(m, i))
+	for (uint32_t i = 0; apart && i < s->emitters; i++) {
+		const uint32_t materials = (uint32_t)m->material.n;
+		const char *name = i < materials ? m->material.name[i] : m->light.name[i - materials];
+		if (i < materials ? !emits(m, i) || !is_used(m, i) : !shines(m, i - materials))
 			continue;
 		if (groups == most)
 			return err_set(e, "more than %zu light groups; solve without them", most);
-		s->group_name[groups] = unique_name(s, groups, m->material.name[i], e);
+		s->group_name[groups] = unique_name(s, groups, name, e);
 		if (!s->group_name[groups])
 			return -1;
 		s->emitter_group[i] = (uint32_t)groups++;
@@ -157,7 +168,11 @@ static void scale_emission(const struct solution *s, struct model *m, const doub
 {
 	size_t bands = (size_t)s->bands;
 
-	for (size_t i = 0; i < s->emitters; i++)
+	for (size_t i = 0; i < m->light.n; i++)
+		for (size_t k = 0; k < bands; k++)
+			m->light.intensity[i * bands + k] *=
+				factor[s->emitter_group[m->material.n + i] * bands + k];
+	for (size_t i = 0; i < m->material.n; i++)
 		for (size_t k = 0; k < 2 * bands; k++)
 			m->material.emission[material_at(&m->material, i, FRONT) + k] *=
 				factor[s->emitter_group[i] * bands + k % bands];

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "light.h"
 #include "mem.h"
 #include "vec3.h"
 
@@ -46,7 +47,7 @@ int model_derive(struct model *m, struct err *e)
 			m->element_patch[i] = (uint32_t)p;
 			m->patch_area[p] += m->element_area[i];
 		}
-	return 0;
+	return lights_derive(m, e);
 }
 
 int materials_new(struct materials *mt, size_t n, int bands, struct err *e)
@@ -92,9 +93,36 @@ void materials_free(struct materials *mt)
 	*mt = (struct materials){ 0 };
 }
 
+int lights_new(struct lights *l, size_t n, int bands, struct err *e)
+{
+	*l = (struct lights){ .n = n };
+	l->name = mem_new(n, sizeof *l->name, "light names", e);
+	l->kind = mem_new(n, 1, "lights", e);
+	l->position = mem_new(n, 3 * sizeof *l->position, "lights", e);
+	l->direction = mem_new(n, 3 * sizeof *l->direction, "lights", e);
+	l->cone = mem_new(n, 2 * sizeof *l->cone, "lights", e);
+	l->intensity = mem_new(n, (size_t)bands * sizeof *l->intensity, "lights", e);
+	return l->name && l->kind && l->position && l->direction && l->cone && l->intensity
+	           ? 0 : -1;
+}
+
+void lights_free(struct lights *l)
+{
+	free_names(l->name, l->n);
+	free(l->kind);
+	free(l->position);
+	free(l->direction);
+	free(l->cone);
+	free(l->intensity);
+	free(l->unit_flux);
+	free(l->cosine);
+	*l = (struct lights){ 0 };
+}
+
 void model_free(struct model *m)
 {
 	materials_free(&m->material);
+	lights_free(&m->light);
 	free_names(m->surface.name, m->surface.n);
 	free(m->surface.material);
 	free(m->surface.has_normals);

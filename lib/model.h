@@ -36,6 +36,25 @@ struct surfaces {
 	uint8_t *has_normals;     /* the file gave NORMALs */
 };
 
+enum light_kind { LIGHT_POINT, LIGHT_SPOT, LIGHT_DIRECTIONAL, LIGHT_KINDS };
+
+/* Punctual lights: sources without area (see light.h). */
+struct lights {
+	size_t n;
+	char **name;              /* unique */
+	uint8_t *kind;            /* enum light_kind */
+	double *position;         /* [n][3] world, metres; 0 for directional ones */
+	double *direction;        /* [n][3] unit, the way that light travels along the
+	                             axis; 0 for points */
+	double *cone;             /* [n][2] half angles of a spot in radians: up to the inner
+	                             its intensity is full, beyond the outer 0; else 0 */
+	double *intensity;        /* [n][bands] cd along the axis; lx, of a plane across
+	                             the light, for directional ones */
+	double *unit_flux;        /* derived, [n] flux of intensity 1 */
+	double *cosine;           /* derived, [n][2] of the cones */
+	double box[2][3];         /* derived: the least and largest coordinates of triangles */
+};
+
 struct camera {
 	char *name;
 	int orthographic;
@@ -60,6 +79,7 @@ struct model {
 	enum lobe_kind lobe;
 	struct materials material;
 	struct surfaces surface;
+	struct lights light;
 	size_t cameras;
 	struct camera *camera;
 
@@ -108,8 +128,8 @@ static inline uint32_t model_patch_material(const struct model *m, uint32_t patc
  * the weights of the element's own corners. O(depth of the split tree). */
 uint32_t model_locate(const struct model *m, uint32_t tri, double w[3]);
 
-/* Fills the derived arrays (areas, normals, element_patch) from the others,
- * allocating them. 0, or -1 and e. O(elements). */
+/* Fills the derived arrays (areas, normals, element_patch, flux of lights) from the
+ * others, allocating them. 0, or -1 and e. O(elements + triangles). */
 int model_derive(struct model *m, struct err *e);
 
 /* 1 if the side of a patch is modelled (front, or back of a two-sided material). */
@@ -123,13 +143,24 @@ static inline int model_side_modelled(const struct model *m, uint32_t patch_side
  * exponents infinite, emission exponents 1). 0, or -1 and e. */
 int materials_new(struct materials *mt, size_t n, int bands, struct err *e);
 
+/* Allocates all arrays of n lights with `bands` bands but the derived ones, zeroed.
+ * 0, or -1 and e. */
+int lights_new(struct lights *l, size_t n, int bands, struct err *e);
+
 /* Index into rho_d and its like. */
 static inline size_t material_at(const struct materials *mt, size_t m, int side)
 {
 	return (2 * m + (size_t)side) * (size_t)mt->bands;
 }
 
+/* A source of light is a patch-side, or, numbered behind these, a punctual light. */
+static inline uint32_t model_sources(const struct model *m)
+{
+	return (uint32_t)(2 * m->patches + m->light.n);
+}
+
 void materials_free(struct materials *mt);
+void lights_free(struct lights *l);
 void model_free(struct model *m);
 
 #endif

@@ -128,6 +128,43 @@ static int check_materials(const struct materials *mt, int bands, struct err *e)
 	return 0;
 }
 
+/* ---- lights ---- */
+
+static int check_light(const struct lights *l, size_t i, int bands, struct err *e)
+{
+	const double *x = &l->position[3 * i], *d = &l->direction[3 * i], *cone = &l->cone[2 * i];
+	double length = v3_length(d);
+
+	if (l->kind[i] >= LIGHT_KINDS)
+		return err_set(e, "array light_kind: light '%.100s': %d is no kind of light",
+		               l->name[i], l->kind[i]);
+	if (!isfinite(x[0] + x[1] + x[2]))
+		return err_set(e, "array light_position: light '%.100s': not finite", l->name[i]);
+	if (l->kind[i] == LIGHT_POINT ? length != 0 : !(fabs(length - 1) <= rigid_slack))
+		return err_set(e, "array light_direction: light '%.100s': length %g instead of %d",
+		               l->name[i], length, l->kind[i] != LIGHT_POINT);
+	if (l->kind[i] == LIGHT_SPOT
+	        ? !(cone[0] >= 0 && cone[0] <= cone[1] && cone[1] > 0 && cone[1] <= pi / 2)
+	        : cone[0] != 0 || cone[1] != 0)
+		return err_set(e, "array light_cone: light '%.100s': %g, %g are no cones", l->name[i],
+		               cone[0], cone[1]);
+	for (int b = 0; b < bands; b++) {
+		double intensity = l->intensity[i * (size_t)bands + (size_t)b];
+		if (!(intensity >= 0 && isfinite(intensity)))
+			return err_set(e, "array light_intensity: light '%.100s', band %d: %g is no "
+			               "intensity", l->name[i], b, intensity);
+	}
+	return 0;
+}
+
+static int check_lights(const struct model *m, struct err *e)
+{
+	for (size_t i = 0; i < m->light.n; i++)
+		if (check_light(&m->light, i, m->bands, e))
+			return -1;
+	return unique_names("lights", m->light.name, m->light.n, e);
+}
+
 /* ---- cameras ---- */
 
 static int rigid(const double t[16])
@@ -341,13 +378,15 @@ static int check_counts(const struct model *m, struct err *e)
 	if (m->elements > INT32_MAX || m->splits > INT32_MAX || m->vertices > UINT32_MAX ||
 	    m->triangles > UINT32_MAX)
 		return err_set(e, "array element: more than 2^31 elements or 2^32 vertices");
+	if (m->light.n > INT32_MAX)
+		return err_set(e, "array light_kind: more than 2^31 lights");
 	return 0;
 }
 
 int model_check(const struct model *m, struct err *e)
 {
 	return check_counts(m, e) || check_materials(&m->material, m->bands, e) ||
-	       check_surfaces(m, e) || check_cameras(m, e) ||
+	       check_surfaces(m, e) || check_lights(m, e) || check_cameras(m, e) ||
 	       check_vertices_and_triangles(m, e) || check_elements(m, e) ||
 	       check_splits(m, e) || check_patches(m, e) || check_loops(m, e) ? -1 : 0;
 }

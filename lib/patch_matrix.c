@@ -42,8 +42,10 @@ static void choose_rows(struct patch_matrix *pm, const uint32_t *column)
 	const struct ff *f = pm->f;
 
 	for (uint32_t r = 0; r < f->rows; r++) {
+		if (f->row_kind[r] > FF_EMISSION)
+			continue;
 		uint32_t at = column[f->row_side[r]];
-		if (at == FF_NO_ROW || f->row_kind[r] > FF_EMISSION)
+		if (at == FF_NO_ROW)
 			continue;
 		if (f->row_kind[r] == FF_DIFFUSE || pm->row[at] == FF_NO_ROW)
 			pm->row[at] = r;

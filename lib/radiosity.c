@@ -18,6 +18,7 @@ static int solution_arrays(struct solution *s, const struct model *m,
 
 	s->element_sides = es;
 	s->patch_sides = ps;
+	s->sources = model_sources(m);
 	s->links = t->links;
 	s->rows = t->rows;
 	s->direct = mem_new(parts, bands * sizeof(double), "irradiance", e);
@@ -26,7 +27,7 @@ static int solution_arrays(struct solution *s, const struct model *m,
 	s->error = mem_new(es, bands * sizeof(double), "irradiance", e);
 	s->error_direct = mem_new(es, bands * sizeof(double), "irradiance", e);
 	s->discretisation = mem_new(es, bands * sizeof(double), "irradiance", e);
-	s->unshot_emission = mem_new(ps, bands * sizeof(double), "unshot flux", e);
+	s->unshot_emission = mem_new(s->sources, bands * sizeof(double), "unshot flux", e);
 	s->unshot_diffuse = mem_new(ps, channels * sizeof(double), "unshot flux", e);
 	s->unshot_link = mem_new(t->links, 2 * channels * sizeof(double), "unshot flux", e);
 	s->shot = mem_new(t->rows, 2 * channels * sizeof(double), "shot flux", e);
@@ -44,9 +45,9 @@ int solution_begin(struct solution *s, const struct model *m, const struct trans
 	*s = (struct solution){ .bands = m->bands };
 	if (light_groups_set(s, m, light_groups, e) || solution_arrays(s, m, t, e))
 		return -1;
-	for (uint32_t i = 0; i < 2 * m->patches; i++)
+	for (uint32_t i = 0; i < s->sources; i++)
 		for (int k = 0; k < m->bands; k++) {
-			uint32_t group = s->emitter_group[model_patch_material(m, i >> 1)];
+			uint32_t group = solution_group(s, m, i);
 			double flux = solver_emitted(m, i, k);
 			s->unshot_emission[i * (size_t)m->bands + (size_t)k] = flux;
 			s->ledger[group * (size_t)m->bands + (size_t)k] += flux;
@@ -54,7 +55,8 @@ int solution_begin(struct solution *s, const struct model *m, const struct trans
 		}
 	if (!(all > 0))
 		return err_set(e, "no emitter: nothing in this scene gives light; give a material "
-		               "emission (glTF emissiveFactor, or emission_front in its extras)");
+		               "emission (glTF emissiveFactor, or emission_front in its extras) or "
+		               "add a light (KHR_lights_punctual)");
 	if (!isfinite(all))
 		return err_set(e, "the emitted flux is not a finite number");
 	return 0;
@@ -69,7 +71,7 @@ static double due(const struct solver *v, uint32_t ps, int exact)
 	const uint64_t *first = v->t->target_link + ps;
 	size_t vectors = s->vectors, bands = (size_t)v->s->bands;
 	const lanes *weight = v->weight + v->parts.of[ps] * vectors;
-	uint32_t group = v->s->emitter_group[model_patch_material(v->t->m, ps >> 1)];
+	uint32_t group = solution_group(v->s, v->t->m, ps);
 	lanes sum = { 0 };
 	double emission = 0;
 
@@ -99,6 +101,26 @@ static int is_due(const struct solver *v, uint32_t ps)
 		return 0;
 	double p = due(v, ps, 1);
 	return p > 0 && p >= least;
+}
+
+/* Lights come before the first round, whatever they are worth: they shoot once. 0 when the
+ * last shot stopped it. */
+static int shoot_lights(struct solver *v, uint64_t last_shot)
+{
+	const struct solution *s = v->s;
+	size_t bands = (size_t)s->bands;
+
+	for (uint32_t i = (uint32_t)s->patch_sides; i < s->sources; i++) {
+		double unshot = 0;
+		for (size_t k = 0; k < bands; k++)
+			unshot += s->unshot_emission[i * bands + k];
+		if (!(unshot > 0))
+			continue;
+		if (s->shots >= last_shot)
+			return 0;
+		solver_shoot_light(v, i);
+	}
+	return 1;
 }
 
 /* Shoots the rest of the current round; 0 when the last shot stopped it. */
@@ -163,8 +185,8 @@ static int rounds(struct solver *v, const struct radiosity_options *o,
 {
 	struct solution *s = v->s;
 	uint64_t last = o->max_shots > UINT64_MAX - s->shots ? UINT64_MAX : s->shots + o->max_shots;
+	int go_on = shoot_lights(v, last);
 	double top = solver_survey(v, &r->unshot);
-	int go_on = 1;
 
 	while (go_on > 0 && (r->unshot > o->stop || s->round[ROUND_LEAST] != 0)) {
 		if (s->round[ROUND_LEAST] == 0 && s->shots >= last)

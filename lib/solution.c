@@ -37,7 +37,8 @@ int solution_check(const struct model *m, const struct solution *s, struct err *
 	size_t channels = solution_channels(s);
 
 	if (s->bands != m->bands || s->element_sides != 2 * m->elements ||
-	    s->patch_sides != 2 * m->patches || s->groups < 1)
+	    s->patch_sides != 2 * m->patches || s->sources != model_sources(m) ||
+	    s->groups < 1)
 		return err_set(e, "array irradiance_direct: it is not that of the model's elements");
 	if (s->groups > CHANNELS_MAX / bands)
 		return err_set(e, "array irradiance_direct: more than %zu light groups",
@@ -52,7 +53,7 @@ int solution_check(const struct model *m, const struct solution *s, struct err *
 	       check_numbers("irradiance_error", s->error, sides, 0, e) ||
 	       check_numbers("irradiance_error_direct", s->error_direct, sides, 0, e) ||
 	       check_numbers("irradiance_discretisation", s->discretisation, sides, 0, e) ||
-	       check_numbers("unshot_emission", s->unshot_emission, s->patch_sides * bands, 1,
+	       check_numbers("unshot_emission", s->unshot_emission, s->sources * bands, 1,
 	                     e) ||
 	       check_numbers("unshot_diffuse", s->unshot_diffuse, s->patch_sides * channels, 1,
 	                     e) ||

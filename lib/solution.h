@@ -17,7 +17,7 @@ enum { ROUND_LEAST, ROUND_NEXT, ROUND_SHOTS, ROUND_UNSHOT, ROUND_TERMS };
 struct solution {
 	size_t groups;             /* light groups */
 	char **group_name;         /* [groups] */
-	size_t emitters;           /* materials */
+	size_t emitters;           /* materials, then punctual lights */
 	uint32_t *emitter_group;   /* [emitters] group of what it emits, 0 if nothing */
 	size_t element_sides;      /* 2 E */
 	int bands;
@@ -33,9 +33,10 @@ struct solution {
 	/* The solver's state, for shoot --resume: what is still to be shot, what each
 	 * row has sent so far, where the rest went. */
 	size_t patch_sides;        /* 2 P */
+	size_t sources;            /* 2 P + L, punctual lights behind patch-sides */
 	size_t links;              /* of all shards, in the solver's order */
 	size_t rows;               /* of all shards, in order */
-	double *unshot_emission;   /* [2P][bands] flux not yet sent by emitters */
+	double *unshot_emission;   /* [2P+L][bands] flux not yet sent by emitters */
 	double *unshot_diffuse;    /* [2P][channels] flux to leave diffusely */
 	double *unshot_link;       /* [links][2][channels] flux to leave by the lobes of a
 	                              link's target: first what has met only emitters,
@@ -48,6 +49,14 @@ struct solution {
 
 enum { LEDGER_EMITTED, LEDGER_ABSORBED, LEDGER_ESCAPED, LEDGER_LOST, LEDGER_CUT,
        LEDGER_TERMS };
+
+/* Group of what a source emits. */
+static inline uint32_t solution_group(const struct solution *s, const struct model *m,
+                                      uint32_t source)
+{
+	return s->emitter_group[source < 2 * m->patches ? model_patch_material(m, source >> 1)
+	                                                : m->material.n + source - 2 * m->patches];
+}
 
 static inline size_t solution_channels(const struct solution *s)
 {

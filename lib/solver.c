@@ -5,21 +5,20 @@
 #include <string.h>
 
 #include "bsdf.h"
+#include "light.h"
 #include "mem.h"
 
 /* ---- the beginning and the end ---- */
 
-double solver_emitted(const struct model *m, uint32_t ps, int band)
+double solver_emitted(const struct model *m, uint32_t source, int band)
 {
-	if (!model_side_modelled(m, ps))
+	if (source >= 2 * m->patches)
+		return light_flux(m, source - 2 * m->patches, band);
+	if (!model_side_modelled(m, source))
 		return 0;
-	return m->patch_area[ps >> 1] *
-	       bsdf_exitance(&m->material, model_patch_material(m, ps >> 1), (int)(ps & 1), band);
-}
-
-static uint32_t group_of(const struct solver *v, uint32_t ps)
-{
-	return v->s->emitter_group[model_patch_material(v->t->m, ps >> 1)];
+	return m->patch_area[source >> 1] *
+	       bsdf_exitance(&m->material, model_patch_material(m, source >> 1),
+	                     (int)(source & 1), band);
 }
 
 static void weigh_components(struct solver *v)
@@ -27,10 +26,10 @@ static void weigh_components(struct solver *v)
 	const struct solution *s = v->s;
 	size_t bands = (size_t)s->bands, vectors = v->sender.vectors;
 
-	for (uint32_t ps = 0; ps < s->patch_sides; ps++)
+	for (uint32_t i = 0; i < s->sources; i++)
 		for (int k = 0; k < s->bands; k++)
-			v->emitted[v->parts.of[ps] * s->groups + group_of(v, ps)] +=
-				solver_emitted(v->t->m, ps, k);
+			v->emitted[v->parts.of[i] * s->groups + solution_group(s, v->t->m, i)] +=
+				solver_emitted(v->t->m, i, k);
 	for (size_t i = 0; i < v->parts.n; i++)
 		for (size_t c = 0; c < v->sender.channels; c++) {
 			double emitted = v->emitted[i * s->groups + c / bands];
@@ -103,7 +102,7 @@ static void check_ledger(struct solver *v)
 	}
 }
 
-/* Counts unshot flux of a side; its magnitude by weight. */
+/* Counts unshot flux of a source; its magnitude by weight. */
 static double count(struct solver *v, uint32_t ps, const lanes *flux)
 {
 	size_t vectors = v->sender.vectors, bands = (size_t)v->s->bands;
@@ -123,13 +122,13 @@ static double count(struct solver *v, uint32_t ps, const lanes *flux)
 	return sum;
 }
 
-static void load_emission(const struct solver *v, uint32_t ps, lanes *to)
+static void load_emission(const struct solver *v, uint32_t source, lanes *to)
 {
 	size_t bands = (size_t)v->s->bands;
 
 	memset(to, 0, v->sender.vectors * sizeof *to);
-	memcpy((double *)to + group_of(v, ps) * bands, v->s->unshot_emission + ps * bands,
-	       bands * sizeof(double));
+	memcpy((double *)to + solution_group(v->s, v->t->m, source) * bands,
+	       v->s->unshot_emission + source * bands, bands * sizeof(double));
 }
 
 double solver_survey(struct solver *v, double *worst)
@@ -150,6 +149,10 @@ double solver_survey(struct solver *v, double *worst)
 		v->priority[ps] = v->links[ps] + count(v, ps, v->emission) +
 		                  count(v, ps, s->unshot_diffuse + ps * vectors);
 		top = fmax(top, v->priority[ps]);
+	}
+	for (uint32_t i = (uint32_t)v->s->patch_sides; i < v->s->sources; i++) {
+		load_emission(v, i, v->emission);
+		count(v, i, v->emission);
 	}
 	*worst = 0;
 	for (size_t i = 0; i < v->parts.n * v->s->groups; i++)
@@ -266,12 +269,12 @@ void solver_book(struct solver *v, const lanes *out)
 	sent_clear(&v->sent);
 }
 
-static void take_emission(struct solver *v, uint32_t ps)
+static void take_emission(struct solver *v, uint32_t source)
 {
 	size_t bands = (size_t)v->s->bands;
 
-	load_emission(v, ps, v->emission);
-	memset(v->s->unshot_emission + ps * bands, 0, bands * sizeof(double));
+	load_emission(v, source, v->emission);
+	memset(v->s->unshot_emission + source * bands, 0, bands * sizeof(double));
 	for (size_t i = 0; i < v->sender.vectors; i++)
 		v->out[i] += v->emission[i];
 }
@@ -289,6 +292,16 @@ void solver_shoot(struct solver *v, uint32_t ps)
 		shoot_row(v, row, FRESH, v->emission, NULL, v->s->shot);
 	solver_send_diffuse(v, ps, v->diffuse, v->s->shot);
 	shoot_links(v, ps);
+	solver_book(v, v->out);
+	v->s->shots++;
+}
+
+void solver_shoot_light(struct solver *v, uint32_t source)
+{
+	memset(v->out, 0, v->sender.vectors * sizeof *v->out);
+	take_emission(v, source);
+	shoot_row(v, v->t->light_row[source - v->s->patch_sides], FRESH, v->emission, NULL,
+	          v->s->shot);
 	solver_book(v, v->out);
 	v->s->shots++;
 }

@@ -36,16 +36,17 @@ int solver_init(struct solver *v, struct solution *s, const struct transport *t,
                 struct err *e);
 void solver_free(struct solver *v);
 
-/* Flux that a patch-side emits. */
-double solver_emitted(const struct model *m, uint32_t ps, int band);
+/* Flux that a source emits. */
+double solver_emitted(const struct model *m, uint32_t source, int band);
 
 /* Looks at all unshot flux: priority, links, unshot, magnitude, negative. Returns the
  * largest priority; the worst component's and group's unshot over emitted flux goes to
  * *worst. Checks the ledger. O(sides + links). */
 double solver_survey(struct solver *v, double *worst);
 
-/* Sends all unshot flux of a patch-side. */
+/* Sends all unshot flux of a patch-side; all of a light. */
 void solver_shoot(struct solver *v, uint32_t ps);
+void solver_shoot_light(struct solver *v, uint32_t source);
 
 /* Sends flux to leave diffusely by a side, or by the lobes of link index l (2 link +
  * freshness), without taking it from anywhere; adds to v->sent and to `shot`, which may

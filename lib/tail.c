@@ -198,6 +198,9 @@ static double all_bounds(const struct tail *x, const struct solution *s)
 		                 s->unshot_emission + ps * x->bands, 1);
 		sum += row_bound(x, row, s->unshot_diffuse + ps * channels, s->groups);
 	}
+	for (size_t i = s->patch_sides; i < s->sources; i++)
+		sum += row_bound(x, t->light_row[i - s->patch_sides],
+		                 s->unshot_emission + i * x->bands, 1);
 	for (size_t l = 0; l < 2 * s->links; l++) {
 		const double *unshot = s->unshot_link + l * channels;
 		const uint32_t *row = t->link_row + (l & ~(size_t)1);

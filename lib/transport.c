@@ -96,16 +96,18 @@ static int size_arrays(struct transport *t, struct err *e)
 	t->row_block = mem_new(t->rows + 1, sizeof *t->row_block, "rows", e);
 	t->diffuse_row = mem_new(sides, sizeof *t->diffuse_row, "rows", e);
 	t->emission_row = mem_new(sides, sizeof *t->emission_row, "rows", e);
+	t->light_row = mem_new(t->m->light.n, sizeof *t->light_row, "rows", e);
 	t->block = mem_new(t->blocks + 1, sizeof *t->block, "blocks", e);
 	t->link_target = mem_new(t->links, sizeof *t->link_target, "links", e);
 	t->link_row = mem_new(t->links, 2 * sizeof *t->link_row, "links", e);
 	t->target_link = mem_new(sides + 1, sizeof *t->target_link, "links", e);
 	if (!t->row_side || !t->row_kind || !t->row_samples || !t->row_block ||
-	    !t->diffuse_row || !t->emission_row || !t->block || !t->link_target ||
+	    !t->diffuse_row || !t->emission_row || !t->light_row || !t->block || !t->link_target ||
 	    !t->link_row || !t->target_link)
 		return -1;
 	memset(t->diffuse_row, 0xff, sides * sizeof *t->diffuse_row);
 	memset(t->emission_row, 0xff, sides * sizeof *t->emission_row);
+	memset(t->light_row, 0xff, t->m->light.n * sizeof *t->light_row);
 	return 0;
 }
 
@@ -125,6 +127,8 @@ static void put_rows(struct transport *t, uint32_t shard, const uint32_t *chain,
 			t->diffuse_row[ps] = (uint32_t)(row + r);
 		else if (f->row_kind[r] == FF_EMISSION)
 			t->emission_row[ps] = (uint32_t)(row + r);
+		else if (f->row_kind[r] == FF_LIGHT)
+			t->light_row[ps - 2 * t->m->patches] = (uint32_t)(row + r);
 	}
 	for (size_t b = 0; b < f->blocks; b++)
 		t->block[block + b] = (struct block){ .chain = chain[f->block_chain[b]],
@@ -433,6 +437,10 @@ static int join(struct transport *t, int threads, struct err *e)
 		link += t->shard[i]->links;
 		free(chain);
 	}
+	for (size_t i = 0; !bad && i < t->m->light.n; i++)
+		if (t->light_row[i] == FF_NO_ROW && t->m->light.unit_flux[i] > 0)
+			bad = err_set(e, "form factors of light %s are missing; run ffcalc again",
+			              t->m->light.name[i]);
 	if (!bad) {
 		chains_tie(&t->chains);
 		sort_links(t, l);
@@ -457,7 +465,7 @@ int transport_init(struct transport *t, const struct model *m, const struct ff *
 void transport_free(struct transport *t)
 {
 	void *array[] = { t->row_side, t->row_kind, t->row_samples, t->row_block,
-		t->diffuse_row, t->emission_row, t->block, t->run_target, t->run_sum, t->run_link,
+		t->diffuse_row, t->emission_row, t->light_row, t->block, t->run_target, t->run_sum, t->run_link,
 		t->link_target, t->link_row, t->target_link };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)

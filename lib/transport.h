@@ -40,11 +40,12 @@ struct transport {
 	struct chains chains;
 
 	size_t rows;
-	uint32_t *row_side;
+	uint32_t *row_side;              /* source: ff.h */
 	uint8_t *row_kind;
 	uint32_t *row_samples;
 	uint64_t *row_block;             /* [rows+1] */
 	uint32_t *diffuse_row, *emission_row; /* [2P], FF_NO_ROW where there is none */
+	uint32_t *light_row;             /* [L] */
 
 	size_t blocks, runs, special_runs;
 	struct block *block;             /* [blocks+1] */

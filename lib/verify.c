@@ -218,7 +218,7 @@ static double unshot(const struct solution *s, size_t band, int magnitude)
 	const struct {
 		const double *flux;
 		size_t n, channels;
-	} list[] = { { s->unshot_emission, s->patch_sides, bands },
+	} list[] = { { s->unshot_emission, s->sources, bands },
 	             { s->unshot_diffuse, s->patch_sides, channels },
 	             { s->unshot_link, 2 * s->links, channels } };
 	double sum = 0;

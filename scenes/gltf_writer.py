@@ -138,6 +138,10 @@ class Scene:
         self.root.setdefault(key, []).append(value)
         return len(self.root[key]) - 1
 
+    def use(self, extension):
+        if extension not in self.root.setdefault("extensionsUsed", []):
+            self.root["extensionsUsed"].append(extension)
+
     def material(self, name, twopass=None, colour=None, glow=None, double_sided=False):
         """twopass: extras.twopass. glow: radiance (r, g, b) as glTF's emission.
         colour: for other viewers; by default from the coefficients."""
@@ -152,7 +156,7 @@ class Scene:
             strength = max(glow)
             m["emissiveFactor"] = [g / strength for g in glow]
             m["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
-            self.root["extensionsUsed"] = ["KHR_materials_emissive_strength"]
+            self.use("KHR_materials_emissive_strength")
         if double_sided:
             m["doubleSided"] = True
         if twopass is not None:
@@ -217,6 +221,27 @@ class Scene:
         lens = {"yfov": math.radians(yfov), "znear": 0.001, "aspectRatio": aspect}
         index = self.append("cameras", {"name": name, "type": "perspective", "perspective": lens})
         self.node(name, camera=index, matrix=matrix)
+
+    def light(self, name, kind, position=(0, 0, 0), direction=(0, 0, -1), intensity=1.0,
+              colour=None, cones=None, scale=1.0):
+        """A punctual light that shines along `direction`; cones: inner and outer half
+        angle of a spot in degrees; scale of its node, which changes nothing."""
+        self.use("KHR_lights_punctual")
+        back = -np.array(direction, float) / np.linalg.norm(direction)
+        right = np.cross((0, 1, 0) if abs(back[1]) < .9 else (1, 0, 0), back)
+        right /= np.linalg.norm(right)
+        matrix = [float(x) for column in (right, np.cross(back, right), back)
+                  for x in (*(scale * column), 0.0)] + [*map(float, position), 1.0]
+        light = {"type": kind, "intensity": intensity}
+        if colour is not None:
+            light["color"] = list(colour)
+        if cones:
+            light["spot"] = {"innerConeAngle": math.radians(cones[0]),
+                             "outerConeAngle": math.radians(cones[1])}
+        lights = self.root.setdefault("extensions", {}).setdefault(
+            "KHR_lights_punctual", {"lights": []})["lights"]
+        lights.append(light)
+        self.node(name, matrix=matrix, extensions={"KHR_lights_punctual": {"light": len(lights) - 1}})
 
     def finish(self):
         """Lays the buffer out; returns its bytes."""

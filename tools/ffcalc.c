@@ -146,11 +146,12 @@ static json_t *options_json(const struct ff_options *o)
 
 static json_t *report_json(const struct ff_stats *s)
 {
-	return json_pack("{s:{s:I, s:I, s:I, s:I}, s:I, s:I, s:I, s:f, s:f, s:f, s:f, s:f, s:f}",
+	return json_pack("{s:{s:I, s:I, s:I, s:I, s:I}, s:I, s:I, s:I, s:f, s:f, s:f, s:f, s:f, s:f}",
 		"rows", "diffuse", (json_int_t)s->rows[FF_DIFFUSE],
 		"emission", (json_int_t)s->rows[FF_EMISSION],
 		"reflected", (json_int_t)s->rows[FF_REFLECTED],
 		"transmitted", (json_int_t)s->rows[FF_TRANSMITTED],
+		"lights", (json_int_t)s->rows[FF_LIGHT],
 		"links", (json_int_t)s->links, "blocks", (json_int_t)s->blocks,
 		"entries", (json_int_t)s->entries, "rays", s->rays, "samples", s->samples,
 		"worst_residual", s->worst_residual, "mean_row_error", s->mean_error,
@@ -177,9 +178,9 @@ static void print_report(const struct ff_stats *s, const struct request *r, doub
 {
 	FILE *out = strcmp(r->output, "-") ? stdout : stderr;
 
-	fprintf(out, "rows          %zu diffuse, %zu emission lobes, %zu reflected, %zu transmitted\n",
-	       s->rows[FF_DIFFUSE], s->rows[FF_EMISSION], s->rows[FF_REFLECTED],
-	       s->rows[FF_TRANSMITTED]);
+	fprintf(out, "rows          %zu diffuse, %zu emission lobes, %zu reflected, %zu transmitted, "
+	        "%zu lights\n", s->rows[FF_DIFFUSE], s->rows[FF_EMISSION], s->rows[FF_REFLECTED],
+	        s->rows[FF_TRANSMITTED], s->rows[FF_LIGHT]);
 	fprintf(out, "links         %zu\n", s->links);
 	fprintf(out, "entries       %zu in %zu blocks\n", s->entries, s->blocks);
 	fprintf(out, "rays          %.0f (%.2f Mray/s)\n", s->rays, s->rays / seconds * 1e-6);

@@ -473,7 +473,8 @@ static void print_block_lines(const struct ff_file *ff, char *const *name, uint3
 
 static int print_row(const struct request *r, struct content *x, struct err *e)
 {
-	static const char *const kind[] = { "diffuse", "emission", "reflected", "transmitted" };
+	static const char *const kind[] = { "diffuse", "emission", "reflected", "transmitted",
+	                                   "light" };
 	const struct ff *f = &x->ff.f;
 	const uint32_t row = (uint32_t)r->row;
 
@@ -487,7 +488,9 @@ static int print_row(const struct request *r, struct content *x, struct err *e)
 		return -1;
 	printf("row       %" PRIu32 "\nfrom      %s\nkind      %s\nsamples   %" PRIu32
 	       "\nscale     %.17g\nresidual  %.17g\nerror     %.17g\n\n", row,
-	       name[f->row_side[row]], kind[f->row_kind[row]], f->row_samples[row],
+	       f->row_kind[row] == FF_LIGHT
+	           ? x->ff.light_name[f->row_side[row] - 2 * x->ff.scene.patches]
+	           : name[f->row_side[row]], kind[f->row_kind[row]], f->row_samples[row],
 	       f->row_scale[row], (double)f->row_residual[row], (double)f->row_error[row]);
 	printf("chain,to,element,value\n");
 	for (uint64_t b = f->row_block[row]; b < f->row_block[row + 1]; b++)

@@ -312,8 +312,9 @@ static void print_counts(FILE *f, const struct job *j)
 	const struct mesher_report *r = &j->mesher;
 	const struct model *m = &j->m;
 
-	fprintf(f, "scene       %zu surface%s, %zu camera%s, %.6g m across\n", m->surface.n,
-	        plural(m->surface.n), m->cameras, plural(m->cameras), r->diagonal);
+	fprintf(f, "scene       %zu surface%s, %zu light%s, %zu camera%s, %.6g m across\n",
+	        m->surface.n, plural(m->surface.n), m->light.n, plural(m->light.n), m->cameras,
+	        plural(m->cameras), r->diagonal);
 	fprintf(f, "triangles   %zu", m->triangles);
 	if (r->total.degenerate)
 		fprintf(f, ", %u without area dropped", r->total.degenerate);

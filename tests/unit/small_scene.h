@@ -3,7 +3,7 @@
  *
  * Unit square of two triangles. Patch 0 (surface 0, two-sided, glossy) holds the
  * elements 0 and 1 of triangle 0, which is split once; patch 1 (surface 1,
- * one-sided) holds element 2, triangle 1. */
+ * one-sided) holds element 2, triangle 1. A spot shines on them. */
 #ifndef SMALL_SCENE_H
 #define SMALL_SCENE_H
 
@@ -45,6 +45,22 @@ static inline void small_materials(struct model *m)
 	m->material.one_sided[1] = 1;
 }
 
+static inline void small_lights(struct model *m)
+{
+	struct err e = { 0 };
+	struct lights *l = &m->light;
+
+	lights_new(l, 1, m->bands, &e);
+	l->name[0] = strdup("spot");
+	l->kind[0] = LIGHT_SPOT;
+	l->position[2] = 2;
+	l->direction[2] = -1;
+	l->cone[0] = .25;
+	l->cone[1] = .5;
+	for (int b = 0; b < m->bands; b++)
+		l->intensity[b] = 10 * (b + 1);
+}
+
 static inline void small_cameras(struct model *m)
 {
 	const double unit[16] = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1 };
@@ -73,6 +89,7 @@ static inline void small_model(struct model *m)
 	*m = (struct model){ .bands = 3, .vertices = 5, .triangles = 2, .splits = 1,
 		.elements = 3, .patches = 2, .loops = 1, .loop_indices = 4 };
 	small_materials(m);
+	small_lights(m);
 	small_cameras(m);
 	m->surface.n = 2;
 	m->surface.name = calloc(2, sizeof *m->surface.name);
@@ -143,16 +160,16 @@ static inline void small_solution(struct solution *s, const struct model *m)
 {
 	const size_t bands = (size_t)m->bands, sides = 2 * m->elements, patch_sides = 2 * m->patches;
 
-	*s = (struct solution){ .groups = 1, .emitters = m->material.n,
-		.emitter_group = calloc(m->material.n, sizeof *s->emitter_group),
+	*s = (struct solution){ .groups = 1, .emitters = m->material.n + m->light.n,
+		.emitter_group = calloc(m->material.n + m->light.n, sizeof *s->emitter_group),
 		.group_name = calloc(1, sizeof *s->group_name),
 		.element_sides = sides, .bands = m->bands,
-		.patch_sides = patch_sides, .links = 1, .shots = 42,
+		.patch_sides = patch_sides, .sources = patch_sides + m->light.n, .links = 1, .shots = 42,
 		.direct = ramp(sides * bands, .5), .caustic = ramp(sides * bands, .25),
 		.indirect = ramp(sides * bands, .125), .error = ramp(sides * bands, .01),
 		.error_direct = ramp(sides * bands, .01),
 		.discretisation = ramp(sides * bands, .02),
-		.unshot_emission = ramp(patch_sides * bands, 0),
+		.unshot_emission = ramp((patch_sides + m->light.n) * bands, 0),
 		.unshot_diffuse = ramp(patch_sides * bands, 1e-3),
 		.unshot_link = ramp(2 * bands, 1e-3),
 		.ledger = ramp(LEDGER_TERMS * bands, 0) };

@@ -381,6 +381,11 @@ static void test_refused_models(void **state)
 	refuse_double(&mt->emission_exponent[2], (double)INFINITY, "material_emission_exponent");
 	refuse_double(&mt->tau_d[6], .1, "one-sided but transmits");
 	refuse_double(&model.vertex[4], (double)NAN, "array vertex: value 4 is nan");
+	refuse_double(&model.light.cone[0], .75, "array light_cone: light 'spot': 0.75, 0.5");
+	refuse_double(&model.light.cone[1], 2, "array light_cone: light 'spot': 0.25, 2");
+	refuse_double(&model.light.direction[0], 1, "array light_direction: light 'spot': length");
+	refuse_double(&model.light.position[0], NAN, "array light_position: light 'spot'");
+	refuse_double(&model.light.intensity[1], -1, "array light_intensity: light 'spot', band 1");
 	refuse_double(&model.camera[0].yfov, 4, "array camera_yfov: camera 'near'");
 	refuse_double(&model.camera[0].yfov, 0, "array camera_yfov: camera 'near'");
 	refuse_double(&model.camera[1].xmag, 0, "camera_xmag, camera_ymag: camera 'far'");
@@ -497,7 +502,7 @@ static void test_forged_form_factors(void **state)
 	FORGE("column", 4, uint16_t, 2, "array block_column: block 3 ends beyond the last column");
 	refuse_forged("receivers", 0, "walls", 0, "metadata receivers: walls, neither elements");
 	refuse_forged("receivers", 0, "patches", 0, "array column: value 1 is 4, which must be below 4");
-	refuse_forged("version", 0, "1", 0, "version 1, this program knows version 3");
+	refuse_forged("version", 0, "1", 0, "version 1, this program knows version 4");
 }
 
 static void refuse_ff(void *where, const void *value, size_t bytes, const char *message)
@@ -532,7 +537,8 @@ static void test_refused_form_factors(void **state)
 	REFUSE(ff.row_error[0], float, -1, "array row_error");
 	REFUSE(ff.row_residual[0], float, (float)NAN, "array row_residual");
 	REFUSE(ff.row_side[1], uint32_t, 4, "array row_side: row 1 leaves patch 2");
-	REFUSE(ff.row_kind[1], uint8_t, 4, "array row_kind: value 1 is 4");
+	REFUSE(ff.row_kind[1], uint8_t, 5, "array row_kind: value 1 is 5");
+	REFUSE(ff.row_kind[1], uint8_t, 4, "array row_side: row 1 leaves source 1, which is no light");
 	REFUSE(ff.row_block[1], uint64_t, 0, "array row_block");
 	REFUSE(ff.row_block[1], uint64_t, UINT64_MAX, "array row_block");
 	REFUSE(ff.block_arrival[1], uint64_t, 2, "array block_arrival");
@@ -545,7 +551,7 @@ static void test_refused_form_factors(void **state)
 	REFUSE(ff.chain_start[1], uint64_t, 1, "chain 0 is not empty");
 	REFUSE(ff.arrival_target[0], uint32_t, 4, "array arrival_target");
 	REFUSE(ff.arrival_direction[0], float, 1, "array arrival_direction");
-	REFUSE(ff.link_source[0], uint32_t, 4, "array link_source");
+	REFUSE(ff.link_source[0], uint32_t, 5, "array link_source");
 	REFUSE(ff.link_chain[0], uint32_t, 2, "array link_chain");
 	REFUSE(ff.link_target[0], uint32_t, 1, "array link_row: link 0 has row 3");
 	REFUSE(ff.patch_end, uint32_t, 3, "array part: patches 0 to 3 of 2");

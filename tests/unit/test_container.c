@@ -54,7 +54,7 @@ static void write_sample(const char *where, const char *mark)
 
 	assert_non_null(w);
 	assert_int_equal(container_meta(w, "format", "twopass.mesh", &e), 0);
-	assert_int_equal(container_meta(w, "version", "1", &e), 0);
+	assert_int_equal(container_meta(w, "version", CACHE_VERSION, &e), 0);
 	assert_int_equal(container_meta(w, "key", mark, &e), 0);
 	assert_int_equal(container_put(w, "narrow", DT_U8, 1, &three, bytes3, &e), 0);
 	int rows = container_array(w, "rows", DT_F32, 2, open, &e);

@@ -115,7 +115,7 @@ static void exchange(double f01, double f10, double error, struct verify *v)
 		.block_start = block_start, .block_escape = escape, .block_black = zero,
 		.block_lost = zero, .block_cut = zero, .block_arrival = arrival, .entries = 2,
 		.column = column, .value64 = value, .patch_end = 2, .part = 1, .parts = 1 };
-	const struct ff_scene s = { 2, 2, 1, start, area, front };
+	const struct ff_scene s = { 2, 2, 1, 0, start, area, front };
 	struct err e = { 0 };
 
 	assert_int_equal(ff_check(&f, &s, &e), 0);
@@ -207,7 +207,7 @@ static void spans(uint32_t first0, uint32_t count0, uint32_t first1, uint32_t co
 		.block_black = zero, .block_lost = zero, .block_cut = zero, .block_arrival = none,
 		.entries = 8, .columns = 4, .column = column, .value = value, .patch_end = 1,
 		.part = 1, .parts = 1 };
-	const struct ff_scene s = { 1, 8, 1, start, area, sides2 };
+	const struct ff_scene s = { 1, 8, 1, 0, start, area, sides2 };
 	struct err e = { 0 };
 
 	if (ff_check(&f, &s, &e) != (message ? -1 : 0) || (message && !strstr(e.text, message)))

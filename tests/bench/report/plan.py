@@ -1,0 +1,58 @@
+"""How much is measured: samples, settings and scenes of a whole, a full and a quick report."""
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Plan:
+    about: str
+    scenes: tuple            # of speed against error
+    samples: dict            # {scene: (paths a pixel, particles)} of the yardsticks
+    ladder: tuple            # paths a pixel of `reference` beside them
+    crowd: tuple             # particles likewise
+    repeat: int              # runs whose median is shown
+    repeat_views: int        # of the Cornell box
+    solutions: int           # of its solutions
+    steps: int               # of each growth
+    ff_scenes: tuple
+    ff_rays: int             # a patch, of their yardstick
+    oracles: tuple           # scenes with exact answers; empty: all
+    lobes: tuple             # arguments of lobes.py
+    most: dict = field(default_factory=dict)  # {(scene, method): settings}, fewer than all
+
+    def settings(self, scene, method):
+        return self.most.get((scene, method), self.most.get(method, 99))
+
+    def methods(self, scene):
+        return [m for m in ("hemicube", "rays", "auto", "analytic") if self.settings(scene, m)]
+
+    def left_out(self):
+        fewer = [f"{m} on {s}" for (s, m), n in
+                 ((k, n) for k, n in self.most.items() if isinstance(k, tuple)) if not n]
+        return (f"Left out, for they take too long: {', '.join(fewer)} (`make report FULL=1`)."
+                if fewer else "")
+
+
+PLAN = Plan(
+    about="All in one run of less than 20 minutes on two processors; `make report FULL=1` "
+          "measures more.",
+    scenes=("cornell", "two-pass", "clutter"),
+    samples={"cornell": (32768, 32_000_000), "two-pass": (2048, 16_000_000),
+             "clutter": (1024, 16_000_000)},
+    ladder=(1, 4, 16, 64, 256), crowd=(10_000, 100_000, 1_000_000), repeat=1, repeat_views=3,
+    solutions=99, steps=99, ff_scenes=("cube16", "cube24", "room", "city100"), ff_rays=40960,
+    oracles=(), lobes=(),
+    most={("two-pass", "analytic"): 0, ("clutter", "analytic"): 0, ("clutter", "hemicube"): 0,
+          ("clutter", "rays"): 3, ("clutter", "auto"): 3})
+FULL = Plan(
+    about="The long report (`make report FULL=1`): also the methods that take long, medians of three.",
+    scenes=PLAN.scenes, samples={name: (4 * s, 4 * p) for name, (s, p) in PLAN.samples.items()},
+    ladder=(1, 4, 16, 64, 256, 1024), crowd=(10_000, 100_000, 1_000_000, 10_000_000), repeat=3,
+    repeat_views=5, solutions=99, steps=99,
+    ff_scenes=("cube16", "cube24", "room", "room-turned", "city100", "city370", "city2100"),
+    ff_rays=409600, oracles=(), lobes=())
+QUICK = Plan(
+    about="A quick try of the programs: samples are so few that the errors mean nothing.",
+    scenes=("cornell",), samples={name: (32, 100_000) for name in PLAN.scenes},
+    ladder=(1, 4), crowd=(1000, 10_000), repeat=1, repeat_views=1, solutions=1, steps=3,
+    ff_scenes=("cube16",), ff_rays=4096, oracles=("furnace_hetero_diffuse",), lobes=(),
+    most={"hemicube": 1, "rays": 1, "auto": 1, "analytic": 0, None: 1})

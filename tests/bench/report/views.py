@@ -1,0 +1,162 @@
+"""The first and each further view of the Cornell box, by what `trace -d` offers."""
+import json
+
+import numpy as np
+
+from chain import Failed
+from measure import ran
+from page import Bar, Table, Title, Words
+from plot import Curve, Panel, draw
+from setting import Solution, Solved, View
+from speed import percent, seconds
+
+COARSE = Solution("`ffcalc -n 1024`", ffcalc=["-n", 1024])
+DEFAULT = Solution("defaults")
+FINE = Solution("`mesh -e 2%`", mesh=["-e", "2%"])
+FINEST = Solution("`mesh -e 2%`, `ffcalc -n 16384`", mesh=["-e", "2%"], ffcalc=["-n", 16384])
+TRACED = [  # solution, options of trace
+    (COARSE, ["-d mesh", "-d direct", "-d gather"]),
+    (DEFAULT, ["-d mesh", "-d direct", "-d gather"]),
+    (FINE, ["-d mesh", "-d direct", "-d gather"]),
+    (FINEST, ["-d mesh", "-d direct", "-d gather"])]
+CENTRES = ["--samples", 1]
+FIRST = [(.045, .5), (.02, 1), (.01, 2.5), (.005, 10)]           # error, processor seconds
+FURTHER = [("mesh", .02, .05), ("direct", .01, .4), ("gather", .005, 3)]
+RADIANCE = [(3, .045), (5, .035), (17, .022), (52, .015)]        # rpict, measured before
+
+
+class Refused:
+    """Options that a program refused, and why."""
+
+    def __init__(self, name, why):
+        self.name, self.words = name, f"{name}: {why}"
+
+
+def views_of(scene, plan):
+    for solution, traced in TRACED[:plan.solutions]:
+        try:
+            solved = Solved(scene, solution, plan.repeat_views, threads=1)
+        except Failed as e:
+            yield Refused(solution.name, str(e))
+            continue
+        for options in traced:
+            try:
+                yield View(solved, options, [*options.split(), *CENTRES], plan.repeat_views, 1)
+            except Failed as e:
+                yield Refused(f"`trace {options}`", str(e))
+
+
+def cells(view, ladder):
+    e = view.errors
+    return [view.solved.solution.name, f"`{view.name}`", seconds(view.seconds()), seconds(view.cpu),
+            percent(e.rmse, 2), f"{100 * e.bias:+.2f} %", percent(e.tail), percent(view.stated, 2),
+            percent(ladder.at(view.seconds())), percent(ladder.at(view.cpu))]
+
+
+HEAD = ["solution", "trace", "view 1", "view 2 …", "error", "bias", "99 %", "stated",
+        "reference, as view 1", "as view 2 …"]
+
+
+def method(view):
+    words = view.name.split()
+    return words[words.index("-d") + 1] if "-d" in words else "mesh"
+
+
+def chosen(views, error, cost):
+    """The cheapest view that is good enough, else the best one."""
+    good = [v for v in views if v.errors.rmse <= error]
+    return min(good, key=cost) if good else min(views, key=lambda v: v.errors.rmse, default=None)
+
+
+def bar_of(what, views, error, limit, cost):
+    v = chosen(views, error, cost)
+    bar = f"{100 * error:g} % in ≤ {limit:g} s"
+    if not v:
+        return Bar(what, bar, "", None), None
+    return Bar(what, bar, f"{percent(v.errors.rmse, 2)} in {cost(v):.2f} s: "
+               f"{v.solved.solution.name}, `trace {v.name}`",
+               v.errors.rmse <= error and cost(v) <= limit), v
+
+
+def bars(views):
+    used, percent_one = [], None
+    for error, limit in FIRST:
+        bar, v = bar_of("Cornell box, view 1, everything included", views, error, limit, View.seconds)
+        used += [v]
+        percent_one = v if error == .01 else percent_one
+        yield bar
+    for name, error, limit in FURTHER:
+        mine = [v for v in views if method(v) == name]
+        bar, v = bar_of(f"each further view, `{name}`", mine, error, limit, lambda v: v.cpu)
+        used += [v]
+        yield bar
+    used = [v for v in used if v]
+    worst = max((v.errors.bias for v in used), key=abs, default=None)
+    yield Bar("bias of the mean radiance, of these views", "≤ .2 %",
+              f"at most {100 * worst:+.2f} %" if used else "", abs(worst) <= .002 if used else None)
+    tail = percent_one.errors.tail if percent_one else None
+    yield Bar("99th percentile of relative pixel error at the 1 % setting", "≤ 5 %",
+              f"{percent(tail)} (of the yardstick itself {percent(percent_one.errors.noise)})"
+              if percent_one else "", tail <= .05 if percent_one else None)
+
+
+def section(run):
+    scene = run.scene("cornell")
+    every = list(run.told("views of the Cornell box", views_of(scene, run.plan)))
+    views = [v for v in every if isinstance(v, View)]
+    ladder = scene.picture_ladder(run.plan.ladder)
+    run.views += views
+    run.bars += bars(views)
+    yield Title("First and further views of the Cornell box")
+    yield Words(f"""`cornell`, camera `{scene.camera}`, {scene.size()}, one sample at the centre of
+        each pixel; seconds of one processor (`-j 1`), medians of {run.plan.repeat_views}. *View 1*
+        is everything: `mesh`, `ffcalc`, `shoot` and a view; *view 2 …* is what each further one
+        costs, a run of `trace` by itself. *Error* is the rmse over the mean of all pixels that
+        see neither the lamp nor nothing, *bias* that of the mean, *99 %* the 99th percentile of
+        the relative error of pixels; *stated* is the error that `trace` itself prints. The last
+        columns are the error of `reference` after the same processor seconds.""")
+    points = lambda name, x: [(x(v), 100 * v.errors.rmse) for v in views if method(v) == name]
+    reference = Curve("reference", [(x, 100 * y) for x, y in ladder.points], dashed=True)
+    names = [name for name, _, _ in FURTHER]
+    first = [Curve(n, sorted(points(n, View.seconds))) for n in names]
+    further = [Curve(n, sorted(points(n, lambda v: v.cpu))) for n in names]
+    theirs = Curve("Radiance, before", [(x, 100 * y) for x, y in RADIANCE], dashed=True)
+    yield draw(run.out, "views", "error of the Cornell box against the seconds of the first and of "
+               "each further view", [
+                   Panel("view 1, everything included", "seconds of one processor", "relative rmse, %",
+                         first + [reference, theirs]),
+                   Panel("each further view", "seconds of one processor", "relative rmse, %",
+                         further + [reference])])
+    yield Table("", HEAD, [cells(v, ladder) for v in views], left=2)
+    refused = list(dict.fromkeys(v.words for v in every if isinstance(v, Refused)))
+    if refused:
+        yield Words("Could not be had: " + "; ".join(refused) + ".")
+    yield from resolved(run, scene)
+
+
+def repaint(scene):
+    """A copy of the scene whose walls all return a tenth less."""
+    with open(scene.gltf) as f:
+        root = json.load(f)
+    for material in root["materials"]:
+        model = material["extras"]["twopass"]
+        model["rho_d"] = [.9 * x for x in np.broadcast_to(model["rho_d"], 3)]
+    path = scene.path("repainted.gltf")
+    with open(path, "w") as f:
+        json.dump(root, f)
+    return path
+
+
+def resolved(run, scene):
+    """The cost of new paint, with the form factors of the old."""
+    Solved(scene, DEFAULT)
+    gltf, mesh = repaint(scene), scene.path("mesh")
+    made = [ran(*words, threads=1) for words in (
+        ("mesh", gltf, "-o", mesh), ("ffcalc", mesh, "-o", scene.path("ff")),
+        ("shoot", mesh, scene.path("ff"), "-o", scene.path("rad")))]
+    cost, kept = sum(r.cpu for r in made), "up to date" in made[1].text
+    run.bars.append(Bar("Cornell box repainted: form factors kept", "≤ .2 s",
+                        f"{cost:.3f} s{'' if kept else ', form factors made anew'}",
+                        kept and cost <= .2))
+    yield Words(f"""All walls painted anew: `mesh` {made[0].cpu:.3f} s, `ffcalc`
+        {made[1].cpu:.3f} s ({'up to date' if kept else 'made anew'}), `shoot` {made[2].cpu:.3f} s.""")

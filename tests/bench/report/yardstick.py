@@ -1,0 +1,207 @@
+"""A scene with what its pictures and solutions are judged by: pictures and particles of
+`reference`, two independent runs b, b' of each. The mean of (a - b) (a - b') has none of
+their variance in it, whatever that is.
+
+Pictures are of pixel centres, and judged at every third pixel each way: nine times the paths
+in each for the same time, which costs less accuracy than it gains."""
+import json
+import math
+import os
+import shutil
+import sys
+
+import numpy as np
+
+from chain import TOP, Failed, picture, run, table
+from measure import fresh, ran
+
+VIEWS = {"cornell": ("classic", 256, 256), "two-pass": ("overview", 320, 240),
+         "clutter": ("overview", 320, 240)}
+
+
+class Lattice:
+    """Every third pixel of a picture, as a picture of its own with the same centres."""
+    STEP = 3
+
+    def __init__(self, width, height):
+        self.height, self.whole = height, width * height
+        self.places = [self.axis(n) for n in (width, height)]
+        self.size = "{}x{}".format(*(count for count, _ in self.places))
+        self.pixels = self.places[0][0] * self.places[1][0]
+
+    @classmethod
+    def axis(cls, n):
+        """How many of n pixels, symmetric about the middle, and the first of them."""
+        count = n // cls.STEP
+        count -= (n - count) % 2
+        return count, (n - cls.STEP * count) // 2 + cls.STEP // 2
+
+    def pick(self, plane):
+        (across, x), (down, y) = self.places
+        return plane[y::self.STEP, x::self.STEP][:down, :across]
+
+    def narrowed(self, yfov):
+        return 2 * math.atan(math.tan(yfov / 2) * self.STEP * self.places[1][0] / self.height)
+
+
+class Errors:
+    """Of a picture, all relative: rmse, bias of the mean, 99th percentile of pixels (lengths
+    over R, G, B, as exrcmp has them), and what that is of the yardstick itself."""
+
+    def __init__(self, a, b, c):
+        self.rmse, self.bias = off(a, b, c), float(np.mean(a) / np.mean((b + c) / 2) - 1)
+        mean = (b + c) / 2
+        self.tail = percentile(length(a - mean) / length(mean))
+        self.noise = percentile(length(b - c) / 2 / length(mean))
+
+
+def length(colours):
+    """Of each pixel's colour."""
+    return np.maximum(np.sqrt((colours ** 2).sum(0)), 1e-30)
+
+
+def percentile(values):
+    return float(np.percentile(values, 99))
+
+
+def off(a, b, c, weight=None):
+    """Relative rmse of a against b and c, without their noise."""
+    weight = np.ones(a.shape[1]) if weight is None else weight
+    square, mean = ((x * weight).mean() / weight.mean() for x in ((a - b) * (a - c), (b + c) / 2))
+    return math.sqrt(max(0, square)) / mean
+
+
+class Ladder:
+    """What `reference` reaches in how many processor seconds, at growing sample counts."""
+
+    def __init__(self):
+        self.points = []
+
+    def add(self, cpu, error):
+        if error > 0:
+            self.points.append((cpu, error))
+
+    def at(self, cpu):
+        """Its error in as much time: on the line between two points, and beyond them by the
+        square root."""
+        if not self.points or cpu <= 0:
+            return None
+        x, y = np.log(self.points).T
+        t = math.log(cpu)
+        beyond = t - min(max(t, x[0]), x[-1])
+        return math.exp(np.interp(t, x, y) - beyond / 2)
+
+
+class Scene:
+    """A scene in a directory of its own. samples: paths a pixel and particles of the
+    yardsticks, each in two halves. Those found in the directory are taken."""
+
+    def __init__(self, name, work, samples, particles):
+        self.name, self.work = name, os.path.join(work, name)
+        self.samples, self.particles = samples, particles
+        self.camera, self.width, self.height = VIEWS[name]
+        self.lattice = Lattice(self.width, self.height)
+        os.makedirs(self.work, exist_ok=True)
+        self.gltf = self.path("gltf")
+        self.copy_scene()
+        with open(self.gltf) as f:
+            root = json.load(f)
+        self.views = sum("camera" in node for node in root["nodes"])
+        for camera in root["cameras"]:
+            lens = camera["perspective"]
+            lens["yfov"] = self.lattice.narrowed(lens["yfov"])
+        with open(self.path("lattice.gltf"), "w") as f:
+            json.dump(root, f)
+        for which in ("", "lattice."):
+            run("mesh", self.path(which + "gltf"), "-o", self.path(which + "mesh"))
+        self.reference_cpu = 0.0
+        self.exact = [self.reference_picture(samples // 2, seed) for seed in (1, 2)]
+        self.lit = [self.reference_irradiance(particles // 2, seed) for seed in (1, 2)] \
+            if particles else []
+        self.keep = None
+
+    def copy_scene(self):
+        kept = os.path.join(TOP, "scenes", self.name + ".gltf")
+        if os.path.exists(kept):
+            shutil.copy(kept, self.gltf)
+            return
+        scenes = os.path.join(TOP, "scenes")
+        words = [sys.executable, os.path.join(scenes, f"make_{self.name}.py"), self.gltf]
+        if os.spawnv(os.P_WAIT, words[0], words):
+            raise Failed(f"make_{self.name}.py could not write {self.gltf}")
+
+    def path(self, extension):
+        return os.path.join(self.work, f"{self.name}.{extension}")
+
+    def size(self):
+        return f"{self.width}x{self.height}"
+
+    # ---- what `reference` makes ----
+
+    def reference_picture(self, samples, seed):
+        path = self.path(f"{samples}.{seed}.exr")
+        if not os.path.exists(path):
+            self.reference_cpu += ran("reference", self.path("lattice.mesh"), "-c", self.camera,
+                                      "-s", self.lattice.size, "--centre", "--seed", seed,
+                                      "--samples", samples, "--compression", "none", "-o", path).cpu
+        planes = picture(path)
+        return np.array([planes[c] for c in "RGB"])
+
+    def reference_irradiance(self, particles, seed):
+        path = self.path(f"{particles}.{seed}.csv")
+        if not os.path.exists(path):
+            self.reference_cpu += ran("reference", self.path("mesh"), "--irradiance", "--seed",
+                                      seed, "--samples", particles, "-o", path).cpu
+        with open(path) as f:
+            return table(f.read())
+
+    def picture_ladder(self, counts):
+        """Of `reference`, as if it drew the whole picture."""
+        ladder = Ladder()
+        for samples in counts:
+            out = fresh(self.path("ladder.exr"))
+            took = ran("reference", self.path("lattice.mesh"), "-c", self.camera, "-s",
+                       self.lattice.size, "--centre", "--seed", 100 + samples, "--samples", samples,
+                       "--compression", "none", "-o", out)
+            planes = picture(out)
+            a = np.array([planes[c] for c in "RGB"])
+            ladder.add(took.cpu * self.lattice.whole / self.lattice.pixels,
+                       off(*(x[:, self.seen()] for x in (a, *self.exact))))
+        return ladder
+
+    def irradiance_ladder(self, counts):
+        ladder = Ladder()
+        for particles in counts:
+            out = fresh(self.path("ladder.csv"))
+            took = ran("reference", self.path("mesh"), "--irradiance", "--seed", 100 + particles,
+                       "--samples", particles, "-o", out)
+            with open(out) as f:
+                ladder.add(took.cpu, self.irradiance_error(table(f.read())))
+        return ladder
+
+    # ---- what is judged ----
+
+    def seen(self):
+        """The pixels that see neither a lamp nor nothing; from any solution."""
+        if self.keep is None:
+            out = fresh(self.path("seen.exr"))
+            run("trace", self.path("rad"), "-c", self.camera, "-s", self.size(), "--samples", 1,
+                "--layers", "emission,Z", "--compression", "none", "-o", out)
+            planes = {name: self.lattice.pick(p) for name, p in picture(out).items()}
+            lamp = sum(planes["emission." + c] for c in "RGB") > 0
+            self.keep = ~lamp & np.isfinite(planes["Z"])
+        return self.keep
+
+    def picture_errors(self, path):
+        planes = picture(path)
+        a = np.array([self.lattice.pick(planes[c]) for c in "RGB"])
+        return Errors(*(x[:, self.seen()] for x in (a, *self.exact)))
+
+    def irradiance_error(self, rows):
+        """Of element-sides, weighted by area; None if they are not those of the yardstick."""
+        tables = [rows, *self.lit]
+        places = [[(r["element"], r["side"][0]) for r in t] for t in tables]
+        if not self.lit or places[0] != places[1]:
+            return None
+        area = np.array([r["area"] for r in rows])
+        return off(*(np.array([[r[f"H_{k}"] for r in t] for k in range(3)]) for t in tables), area)

@@ -1,0 +1,99 @@
+#!/usr/bin/python3
+"""The parts of `make report`: which pixels are compared, errors without the yardstick's
+noise, fits, and a page of tiny samples."""
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+sys.dont_write_bytecode = True
+TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+REPORT = os.path.join(TESTS, "bench", "report")
+sys.path[:0] = [REPORT, TESTS, os.path.join(os.path.dirname(TESTS), "scenes")]
+from chain import BUILD, TOP, Tap, picture, run
+from growth import Fit
+from yardstick import Ladder, Lattice, off
+
+
+def lattice_depths(folder, width, height):
+    """Depths at the lattice's pixels: of the whole picture, and of its own."""
+    lattice, depths = Lattice(width, height), []
+    with open(os.path.join(TOP, "scenes", "furnace.gltf")) as f:
+        root = json.load(f)
+    for which, size in (("whole", f"{width}x{height}"), ("lattice", lattice.size)):
+        path = lambda extension: os.path.join(folder, f"{which}.{extension}")
+        if which == "lattice":
+            for camera in root["cameras"]:
+                camera["perspective"]["yfov"] = lattice.narrowed(camera["perspective"]["yfov"])
+        with open(path("gltf"), "w") as f:
+            json.dump(root, f)
+        run("mesh", "-p", "inf", "-e", "inf", path("gltf"), "-o", path("mesh"))
+        run("ffcalc", "-n", 16, path("mesh"), "-o", path("ff"))
+        run("shoot", path("mesh"), path("ff"), "-o", path("rad"))
+        run("trace", path("rad"), "-c", "inside", "-s", size, "--samples", 1, "--layers", "Z",
+            "--compression", "none", "-o", path("exr"))
+        depths.append(picture(path("exr"))["Z"])
+    return lattice.pick(depths[0]), depths[1]
+
+
+def places(tap, folder):
+    for width, height in ((32, 24), (33, 22), (31, 31)):
+        whole, own = lattice_depths(folder, width, height)
+        tap.ok(whole.shape == own.shape and np.allclose(whole, own, rtol=1e-5),
+               f"every third pixel of {width}x{height} is the same by itself")
+
+
+def errors(tap):
+    rng = np.random.default_rng(1)
+    true, n = np.full((3, 100000), 2.0), (3, 100000)
+    a = true + rng.normal(0, .02, n)
+    b, c = (true + rng.normal(0, .2, n) for _ in range(2))
+    tap.ok(abs(off(a, b, c) - .01) < .001, "an error of a tenth of the yardstick's noise",
+           f"got {off(a, b, c)}")
+
+
+def curves(tap):
+    ladder = Ladder()
+    for cpu in (1, 4, 16):
+        ladder.add(cpu, .8 / cpu ** .5)
+    tap.ok(all(abs(ladder.at(t) * t ** .5 / .8 - 1) < 1e-9 for t in (.1, 1, 2, 9, 100)),
+           "errors in equal time follow the square root, also beyond what was measured")
+    x = np.array([100, 200, 300, 500, 1000.0])
+    fit = Fit(x, 3e-4 * x ** 1.7, .01)
+    tap.ok(abs(fit.exponent - 1.7) < 1e-9 and fit.error < 1e-6, "a power law's exponent is found")
+    tap.ok(Fit(x, 1e-9 * x, .01).exponent is None, "no exponent from times that are too short")
+
+
+def page(tap, folder):
+    done = subprocess.run([sys.executable, REPORT, "--quick", "--only", "views", "--out", folder],
+                          capture_output=True, text=True, check=False,
+                          env={**os.environ, "BUILD": BUILD})
+    tap.ok(done.returncode == 0, "a page of tiny samples", *done.stderr.splitlines()[-3:])
+    text = {name: "" for name in ("index.html", "report.txt", "views.svg")}
+    for name in text:
+        if os.path.exists(os.path.join(folder, name)):
+            with open(os.path.join(folder, name), encoding="utf-8") as f:
+                text[name] = f.read()
+    tap.ok("<svg" in text["views.svg"], "a plot is beside it")
+    tap.ok(all("view 1, everything included" in text[n] and "`" not in text["index.html"]
+               for n in ("index.html", "report.txt")), "page and text have the table of bars")
+
+
+def main():
+    tap = Tap()
+    folder = tempfile.mkdtemp(prefix="twopass-report-test.")
+    try:
+        places(tap, folder)
+        errors(tap)
+        curves(tap)
+        page(tap, folder)
+    finally:
+        shutil.rmtree(folder)
+    sys.exit(tap.finish())
+
+
+main()
