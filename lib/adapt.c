@@ -14,8 +14,13 @@
  * through it, whose length stays. Edges decide. */
 static const double left = .70710678118654752;
 
-/* Of the variance, what an estimate that has it subtracted may still be off by. */
-static const double doubtful = 2;
+/* What one step leaves of the energy, if more is asked for: the last of it would take elements
+ * wherever there is any error at all. */
+static const double once = .4;
+
+/* Of the variance, what an estimate that has it subtracted may still be off by: that looks at
+ * some ten second differences, which are larger than noise, and noise is far from even. */
+static const double doubtful = 100;
 
 enum {
 	ELEMENTS_A_PATCH = 5, /* at least, when it is halved */
@@ -35,14 +40,15 @@ struct plan {
 	size_t elements;      /* and no more than so many elements */
 };
 
-/* Square of the error of an element-side's irradiance, as far as it is certain: an estimate
- * from few elements is off by as much as the noise of their light, of which only light
- * straight from emitters is free. */
+/* Square of the error of an element-side's irradiance, as far as it is certain: light straight
+ * from emitters has hardly any noise. */
 static double certain(const struct solution *s, size_t at)
 {
-	double d = s->discretisation[at], noise = s->error[at], direct = s->error_direct[at];
+	double direct = s->discretisation_direct[at] * s->discretisation_direct[at];
+	double other = s->discretisation[at] * s->discretisation[at] - direct;
+	double noise = s->error[at] * s->error[at] - s->error_direct[at] * s->error_direct[at];
 
-	return fmax(0, d * d - doubtful * fmax(0, noise * noise - direct * direct));
+	return direct + fmax(0, other - doubtful * fmax(0, noise));
 }
 
 /* Adds up the error of what one side shows, in units of irradiance: coefficients times the
@@ -207,9 +213,9 @@ int adapt_plan(const struct model *m, const struct solution *s, const struct mes
 	if (!status) {
 		double unit = find_energies(&p, s);
 		find_room(&p, smallest);
-		p.allowed = o->error * o->error * unit;
 		double own = total(p.energy, m->elements);
 		double others = total(p.patch_energy, m->patches);
+		p.allowed = fmax(o->error * o->error * unit, once * (own + others));
 		double bound = own + others <= p.allowed ? INFINITY : find_bound(&p);
 		double expected = expect(&p, bound, &elements);
 		for (size_t i = 0; i < m->elements; i++)

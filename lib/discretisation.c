@@ -17,6 +17,9 @@ static const double cos_crease = .86602540378443865;
  * variation, as at steps: as it is for such fields on jittered grids. */
 static const double error_by_curvature = 1. / 3, error_by_roughness = 1.7;
 
+/* Noise is not equal everywhere: so much of it is taken for no detail. */
+static const double noise_guard = 1.5;
+
 enum { NEAR_MAX = 64, CHUNK = 256, PARTS = 2 };
 
 struct near {
@@ -152,6 +155,52 @@ static void differences(void *arg, size_t begin, size_t end, int thread)
 	}
 }
 
+/* ---- noise ---- */
+
+/* A quantile of difference squared over its stated variance, to 5 %, by a histogram of
+ * logarithms; INFINITY where there is no noise. */
+static double quantile_of_ratios(const struct job *j, size_t part, double q)
+{
+	enum { BINS = 2048, A_FACTOR_2 = 16 };
+	size_t bands = (size_t)j->s->bands, n = j->s->element_sides * PARTS * bands;
+	size_t count[BINS] = { 0 }, all = 0, below = 0;
+	int bin = 0;
+
+	for (size_t i = 0; i < n; i++) {
+		double d = j->difference[i];
+		if (i / bands % PARTS != part || isnan(d) || !(j->noise[i] > 0))
+			continue;
+		double at = BINS / 2 + A_FACTOR_2 * log2(fmax(d * d / j->noise[i], 1e-18));
+		count[(size_t)fmax(0, fmin(BINS - 1, at))]++;
+		all++;
+	}
+	while (bin < BINS - 1 && (double)(below + count[bin]) < q * (double)all)
+		below += count[bin++];
+	return all ? exp2((bin + .5 - BINS / 2) / A_FACTOR_2) : INFINITY;
+}
+
+/* Stated errors take samples for independent. Where most elements differ less from their
+ * neighbours than that says, errors are scaled to what they do. */
+static void correct_noise(struct job *j)
+{
+	/* Steps are in the other elements. Of chi-square with one degree of freedom: */
+	static const double most = .7, chi_square = 1.0742;
+	size_t bands = (size_t)j->s->bands, n = j->s->element_sides * bands;
+	double scale[PARTS];
+
+	for (size_t part = 0; part < PARTS; part++)
+		scale[part] = fmin(1, quantile_of_ratios(j, part, most) / chi_square);
+	for (size_t i = 0; i < n * PARTS; i++)
+		j->noise[i] *= scale[i / bands % PARTS];
+	for (size_t i = 0; i < n; i++) {
+		const double *v = &j->variance[i / bands * PARTS * bands + i % bands];
+		j->s->error_direct[i] = sqrt(scale[0] * v[0]);
+		j->s->error[i] = sqrt(scale[0] * v[0] + scale[1] * v[bands]);
+	}
+}
+
+/* ---- errors ---- */
+
 /* Moments of the differences in an element and around. */
 struct moments {
 	double area, mean, square, noise;
@@ -173,7 +222,7 @@ static double square_error(const struct moments *m)
 {
 	if (!(m->area > 0))
 		return 0;
-	double mean = m->mean / m->area, all = (m->square - m->noise) / m->area;
+	double mean = m->mean / m->area, all = (m->square - noise_guard * m->noise) / m->area;
 	double square = error_by_roughness * error_by_roughness * (all - mean * mean) +
 	                error_by_curvature * error_by_curvature * mean * mean;
 	return square > 0 ? square : 0;
@@ -189,13 +238,18 @@ static void errors(void *arg, size_t begin, size_t end, int thread)
 	for (size_t e = begin; e < end; e++) {
 		size_t n = list_near(j, e, 1, near);
 		double *to = &j->s->discretisation[2 * e * bands];
+		double *direct = &j->s->discretisation_direct[2 * e * bands];
 		memset(to, 0, 2 * bands * sizeof *to);
 		for (size_t c = 0; c < channels; c++) {
 			struct moments m = { 0 };
 			add(j, e, e * channels + c, &m);
 			for (size_t i = 0; i < n; i++)
 				add(j, near[i].element, near[i].element * channels + c, &m);
-			to[c / (PARTS * bands) * bands + c % bands] += square_error(&m);
+			size_t at = c / (PARTS * bands) * bands + c % bands;
+			double square = square_error(&m);
+			to[at] += square;
+			if (c / bands % PARTS == 0)
+				direct[at] = sqrt(square);
 		}
 		for (size_t c = 0; c < 2 * bands; c++)
 			to[c] = sqrt(to[c]);
@@ -233,6 +287,7 @@ int discretisation_estimate(const struct model *m, struct solution *s, int threa
 	if (j.h && j.variance && j.difference && j.noise && !smooth_groups_new(m, cos_crease, &j.g, e)) {
 		take_parts(&j);
 		par_for(m->elements, CHUNK, threads, differences, &j, NULL);
+		correct_noise(&j);
 		par_for(m->elements, CHUNK, threads, errors, &j, NULL);
 		bad = 0;
 	}

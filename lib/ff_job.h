@@ -12,7 +12,7 @@
 
 /* FF_CLOSE_RAYS: a power of two that an element close to an emitter casts.
  * FF_FEWER: small elements gather with down to 2^-FF_FEWER of the rays. */
-enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048, FF_FEWER = 4 };
+enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048, FF_FEWER = 0 };
 
 /* An element as a place to send rays from. Points are corner + w1 edge[0] + w2 edge[1],
  * with weights that keep a little clear of the edges. Threes are padded to four. */

@@ -162,10 +162,12 @@ static void finish(struct sender *s, lanes *cut)
 	s->touches = 0;
 }
 
-/* Flux landing from a block: four channels of it, x by unit of the values. */
+/* Flux landing from a block: four channels of it, x by unit of the values. The loops over
+ * runs are made twice, inlined with n known to be 1 and not. */
 struct landing {
 	const struct sender *s;
 	const struct block *block;
+	size_t v, n;                 /* vector of how many */
 	int freshness;
 	lanes x;
 };
@@ -179,42 +181,43 @@ static ALWAYS_INLINE void land_plain(const struct landing l, uint64_t run, lanes
                                      lanes *absorbed)
 {
 	uint32_t target = l.s->t->run_target[run];
-	const lanes *part = l.s->part + l.s->surface[target] * PARTS;
-	lanes x = l.x * l.s->t->run_sum[run], same = part[PART_RHO] * x;
+	const lanes *part = l.s->part + l.s->surface[target] * PARTS * l.n + l.v;
+	lanes x = l.x * l.s->t->run_sum[run], same = part[PART_RHO * l.n] * x;
 
-	l.s->unshot_diffuse[target] += same;
+	l.s->unshot_diffuse[target * l.n + l.v] += same;
 	*kept += same;
-	*absorbed += part[PART_ABSORBED] * x;
+	*absorbed += part[PART_ABSORBED * l.n] * x;
 }
 
-static ALWAYS_INLINE void land_special(const struct landing l, uint64_t run, uint32_t link,
+static ALWAYS_INLINE void land_special(const struct landing l, uint64_t run,
                                        struct landed *sum)
 {
 	uint32_t target = l.s->t->run_target[run];
-	const lanes *part = l.s->part + l.s->surface[target] * PARTS;
-	lanes x = l.x * l.s->t->run_sum[run], same = part[PART_RHO] * x;
-	lanes other = part[PART_TAU] * x, lobes = part[PART_LOBES] * x;
+	uint32_t link = l.s->t->run_link[l.block->link + (run - l.block->special)];
+	const lanes *part = l.s->part + l.s->surface[target] * PARTS * l.n + l.v;
+	lanes x = l.x * l.s->t->run_sum[run], same = part[PART_RHO * l.n] * x;
+	lanes other = part[PART_TAU * l.n] * x, lobes = part[PART_LOBES * l.n] * x;
 
-	l.s->unshot_diffuse[target] += same;
-	l.s->unshot_diffuse[target ^ 1] += other;
+	l.s->unshot_diffuse[target * l.n + l.v] += same;
+	l.s->unshot_diffuse[(target ^ 1) * l.n + l.v] += other;
 	sum->kept[0] += same + other;
-	sum->absorbed[0] += part[PART_ABSORBED] * x;
+	sum->absorbed[0] += part[PART_ABSORBED * l.n] * x;
 	if (link == FF_NO_ROW) {
 		sum->cut += lobes;
 		return;
 	}
-	l.s->unshot_link[2 * (size_t)(link & ~RUN_GUESSED) + (size_t)l.freshness] += lobes;
+	size_t at = 2 * (size_t)(link & ~RUN_GUESSED) + (size_t)l.freshness;
+	l.s->unshot_link[at * l.n + l.v] += lobes;
 	l.s->link_gain[target] += lanes_total(&lobes, 1);
 	sum->kept[1] += lobes;
 	if (link & RUN_GUESSED)
 		sum->guessed += lobes;
 }
 
-/* Where channels fit one vector. */
-static void land_one(const struct landing l, struct sent *sent)
+static ALWAYS_INLINE void land(const struct landing l, uint64_t i, uint64_t end,
+                               struct sent *sent)
 {
-	const uint32_t *link = l.s->t->run_link + l.block->link;
-	uint64_t i = l.block->run, special = l.block->special, end = l.block[1].run;
+	uint64_t special = l.block->special < end ? l.block->special : end;
 	struct landed sum = { 0 };
 
 	for (; i + 1 < special; i += 2) {
@@ -222,81 +225,33 @@ static void land_one(const struct landing l, struct sent *sent)
 		land_plain(l, i + 1, &sum.kept[1], &sum.absorbed[1]);
 	}
 	if (i < special)
-		land_plain(l, i, &sum.kept[0], &sum.absorbed[0]);
-	for (i = special; i < end; i++)
-		land_special(l, i, *link++, &sum);
-	sent->kept[0] += sum.kept[0] + sum.kept[1];
-	sent->absorbed[0] += sum.absorbed[0] + sum.absorbed[1];
-	sent->cut[0] += sum.cut;
-	sent->guessed[0] += sum.guessed;
-}
-
-/* What comes to the lobes of a special side by a run. */
-static void land_lobes(struct sender *s, uint32_t target, uint32_t link, int freshness,
-                       const lanes *x, struct sent *sent)
-{
-	const size_t n = s->vectors;
-	const lanes *part = s->part + (s->surface[target] * PARTS + PART_LOBES) * n;
-	lanes *to = s->unshot_link +
-	            (2 * (size_t)(link & ~RUN_GUESSED) + (size_t)freshness) * n;
-
-	for (size_t v = 0; v < n; v++) {
-		lanes lobes = part[v] * x[v];
-		if (link == FF_NO_ROW) {
-			sent->cut[v] += lobes;
-			continue;
-		}
-		to[v] += lobes;
-		s->link_gain[target] += lanes_total(&lobes, 1);
-		sent->kept[v] += lobes;
-		if (link & RUN_GUESSED)
-			sent->guessed[v] += lobes;
-	}
-}
-
-/* Where they do not: each run is read once for all. */
-static void land_many(struct sender *s, const struct block *block, int freshness,
-                      const lanes *in, struct sent *sent)
-{
-	const size_t n = s->vectors;
-	lanes x[VECTORS_MAX];
-
-	for (uint64_t i = block->run; i < block[1].run; i++) {
-		uint32_t target = s->t->run_target[i];
-		const lanes *part = s->part + s->surface[target] * PARTS * n;
-		lanes *here = s->unshot_diffuse + target * n;
-		lanes *there = s->unshot_diffuse + (target ^ 1) * n;
-		for (size_t v = 0; v < n; v++) {
-			x[v] = in[v] * s->t->run_sum[i];
-			lanes same = part[PART_RHO * n + v] * x[v];
-			here[v] += same;
-			sent->kept[v] += same;
-			sent->absorbed[v] += part[PART_ABSORBED * n + v] * x[v];
-		}
-		if (i < block->special)
-			continue;
-		for (size_t v = 0; v < n; v++) {
-			there[v] += part[PART_TAU * n + v] * x[v];
-			sent->kept[v] += part[PART_TAU * n + v] * x[v];
-		}
-		land_lobes(s, target, s->t->run_link[block->link + (i - block->special)],
-		           freshness, x, sent);
-	}
+		land_plain(l, i++, &sum.kept[0], &sum.absorbed[0]);
+	for (; i < end; i++)
+		land_special(l, i, &sum);
+	sent->kept[l.v] += sum.kept[0] + sum.kept[1];
+	sent->absorbed[l.v] += sum.absorbed[0] + sum.absorbed[1];
+	sent->cut[l.v] += sum.cut;
+	sent->guessed[l.v] += sum.guessed;
 }
 
 static void send_block(struct sender *s, const struct block *block, int freshness,
                        const lanes *in, struct sent *sent)
 {
+	enum { TILE = 64 };          /* runs that stay in cache for all vectors */
 	const struct transport *t = s->t;
-	uint64_t runs = block[1].run - block->run;
+	const uint64_t end = block[1].run;
+	const size_t n = s->vectors;
 
-	if (s->vectors == 1)
-		land_one((struct landing){ s, block, freshness, in[0] }, sent);
+	if (n == 1)
+		land((struct landing){ s, block, 0, 1, freshness, in[0] }, block->run, end, sent);
 	else
-		land_many(s, block, freshness, in, sent);
-	s->runs += runs;
-	s->bytes += (double)runs * (sizeof *t->run_target + sizeof *t->run_sum) +
-	            (double)(block[1].run - block->special) * sizeof *t->run_link;
+		for (uint64_t i = block->run; i < end; i += TILE)
+			for (size_t v = 0; v < n; v++)
+				land((struct landing){ s, block, v, n, freshness, in[v] }, i,
+				     i + TILE < end ? i + TILE : end, sent);
+	s->runs += end - block->run;
+	s->bytes += (double)(end - block->run) * (sizeof *t->run_target + sizeof *t->run_sum) +
+	            (double)(end - block->special) * sizeof *t->run_link;
 }
 
 /* What goes on from a block's ideal runs when x is its flux by unit of the values. */

@@ -114,6 +114,7 @@ static inline void grid_solution_free(struct solution *s)
 	free(s->indirect);
 	free(s->error);
 	free(s->error_direct);
+	free(s->discretisation_direct);
 	free(s->discretisation);
 }
 

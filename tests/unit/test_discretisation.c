@@ -96,10 +96,11 @@ static double square(const struct model *m, const struct reconstruction *r, size
 
 struct outcome {
 	double stated, exact;   /* root mean squares over the surface */
+	double noise;           /* as corrected */
 };
 
-/* Jittered elements of a field's means with noise of a known standard error. */
-static struct outcome run(field *f, double noise)
+/* Jittered elements of a field's means with noise, and what its error is said to be. */
+static struct outcome run_noisy(field *f, double noise, double said)
 {
 	struct model m;
 	struct solution s;
@@ -118,9 +119,10 @@ static struct outcome run(field *f, double noise)
 	grid_solution(&m, 0, &s);
 	for (size_t i = 0; i < m.elements; i++) {
 		s.indirect[2 * i] = mean(&m, i, f) + noise * sqrt(12) * (rng_uniform(&g) - .5);
-		s.error[2 * i] = noise;
+		s.error[2 * i] = said;
 	}
 	s.discretisation = calloc(2 * m.elements, sizeof *s.discretisation);
+	s.discretisation_direct = calloc(2 * m.elements, sizeof *s.discretisation_direct);
 	assert_int_equal(discretisation_estimate(&m, &s, 2, &e), 0);
 	assert_int_equal(reconstruct(&m, &s, PART_ALL, 1, &r, &e), 0);
 	for (size_t i = 0; i < m.elements; i++) {
@@ -128,12 +130,18 @@ static struct outcome run(field *f, double noise)
 		o.stated += m.element_area[i] * s.discretisation[2 * i] * s.discretisation[2 * i];
 		assert_true(s.discretisation[2 * i + 1] == 0);
 	}
+	o.noise = s.error[0];
 	o.exact = sqrt(o.exact);
 	o.stated = sqrt(o.stated);
 	reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);
 	return o;
+}
+
+static struct outcome run(field *f, double noise)
+{
+	return run_noisy(f, noise, noise);
 }
 
 static void test_exact_fields(void **state)
@@ -171,6 +179,17 @@ static void test_noise(void **state)
 	within_factor(run(step, .01), 1.5);
 }
 
+/* Errors that are stated too large are corrected, in spite of a step; others are not. */
+static void test_stated_noise(void **state)
+{
+	(void)state;
+	assert_true(fabs(run_noisy(constant, .05, .15).noise / .05 - 1) < .2);
+	assert_true(fabs(run_noisy(step, .05, .15).noise / .05 - 1) < .35);
+	assert_true(fabs(run_noisy(linear, .05, .15).noise / .05 - 1) < .2);
+	assert_true(run_noisy(constant, .05, .02).noise == .02);
+	within_factor(run_noisy(step, .05, .15), 1.6);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -178,6 +197,7 @@ int main(void)
 		cmocka_unit_test(test_smooth_fields),
 		cmocka_unit_test(test_shadow_edge),
 		cmocka_unit_test(test_noise),
+		cmocka_unit_test(test_stated_noise),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

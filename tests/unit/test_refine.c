@@ -17,7 +17,8 @@ static struct solution lit(const struct model *m)
 		.direct = calloc(n, sizeof(double)), .caustic = calloc(n, sizeof(double)),
 		.indirect = calloc(n, sizeof(double)), .error = calloc(n, sizeof(double)),
 		.error_direct = calloc(n, sizeof(double)),
-		.discretisation = calloc(n, sizeof(double)) };
+		.discretisation = calloc(n, sizeof(double)),
+		.discretisation_direct = calloc(n, sizeof(double)) };
 
 	for (size_t i = 0; i < n; i++)
 		s.direct[i] = 1;
@@ -39,7 +40,7 @@ static void doubt(const struct model *m, struct solution *s, const double at[3],
 		centroid(m, e, c);
 		v3_sub(c, at, c);
 		if (v3_length(c) < reach)
-			s->discretisation[2 * e] = .5;
+			s->discretisation[2 * e] = s->discretisation_direct[2 * e] = .5;
 	}
 }
 
