@@ -127,15 +127,12 @@ static int fill_samples(struct ff_samples *s, uint32_t each, uint64_t n, struct 
 static int make_samples(struct ff_job *j, struct err *e)
 {
 	uint32_t each = j->o.rays / FF_REPLICATES, gather = j->o.gather;
-	uint32_t shared = gather && gather < GATHERING_POINTS ? GATHERING_POINTS / gather : 1;
+	uint32_t share = gather && gather < GATHERING_POINTS ? GATHERING_POINTS / gather : 1;
 
 	if (j->o.method == FF_HEMICUBE)
 		return 0;
-	return fill_samples(&j->of_rows[0], each, (uint64_t)each * j->o.emitter_gain, e) ||
-	       fill_samples(&j->of_rows[1], each >> FF_FEWER, each, e) ||
-	       fill_samples(&j->of_gathering[0], gather, (uint64_t)gather * shared, e) ||
-	       fill_samples(&j->of_gathering[1], gather >> FF_FEWER, (uint64_t)gather * shared, e)
-	           ? -1 : 0;
+	return fill_samples(&j->of_rows, each, (uint64_t)each * j->o.emitter_gain, e) ||
+	       fill_samples(&j->of_gathering, gather, (uint64_t)gather * share, e) ? -1 : 0;
 }
 
 /* A ray that lands on some sides has more to it than where it lands. */
@@ -174,15 +171,14 @@ static int prepare_rows(struct ff_job *j, int patches, struct err *e)
 		return -1;
 	if (formula && ff_formula_init(&j->formula, j->m, j->o.method == FF_ANALYTIC, e))
 		return -1;
-	return make_samples(j, e) || make_places(j, e) ? -1 : 0;
+	return make_samples(j, e) || make_places(j, e) || ff_find_chain_most(j, e) ? -1 : 0;
 }
 
 static void job_free(struct ff_job *j)
 {
 	void *array[] = { j->element, j->shoots_diffuse, j->shoots_lobe, j->has_lobe,
-		j->is_source, j->emits, j->is_ideal, j->is_black, j->of_rows[0].bits,
-		j->of_rows[1].bits,
-		j->of_gathering[0].bits, j->of_gathering[1].bits };
+		j->is_source, j->emits, j->is_ideal, j->is_black, j->of_rows.bits,
+		j->of_gathering.bits };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
@@ -201,7 +197,7 @@ static int thread_init(struct ff_thread *t, const struct ff_job *j, struct err *
 	                                    FORMULA_BODIES, 0 };
 
 	*t = (struct ff_thread){ .job = j };
-	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, e))
+	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, j->chain_most, e))
 		return -1;
 	if (j->formula.on) {
 		t->formula = mem_new(1, sizeof *t->formula, "formulas", e);
@@ -225,6 +221,7 @@ static void thread_free(struct ff_thread *t)
 		exchanger_free(t->formula);
 	free(t->formula);
 	free(t->captures.data);
+	free(t->pairs.data);
 	free(t->sights.data);
 	free(t->lit.data);
 	free(t->item);
@@ -344,7 +341,7 @@ static int all_patches(struct run *r, uint32_t begin, uint32_t end, struct chain
 {
 	for (uint32_t p = begin; p < end; p += PATCHES_AT_A_TIME) {
 		size_t n = end - p < PATCHES_AT_A_TIME ? end - p : PATCHES_AT_A_TIME;
-		double before = r->job->gather.done ? (double)r->job->m->patches : 0;
+		double before = r->job->gather.rays ? (double)r->job->m->patches : 0;
 		struct part_progress pp = { progress, before + p - begin, before + end - begin };
 		struct progress inner = { report, &pp };
 		r->first = p;
@@ -420,7 +417,7 @@ static int build_rows(struct ff_job *j, int patches, struct ff *whole, struct ff
 	int threads = j->o.threads > 0 ? j->o.threads : 1;
 	struct chains chains = { 0 };
 	struct run run = { .job = j };
-	int bad = prepare_rows(j, patches, e) || chains_init(&chains, j->m, e);
+	int bad = prepare_rows(j, patches, e) || chains_init(&chains, j->m, j->chain_most, e);
 
 	run.thread = mem_new((size_t)threads, sizeof *run.thread, "threads", e);
 	run.batch = mem_new(PATCHES_AT_A_TIME, sizeof *run.batch, "batches", e);
@@ -436,6 +433,7 @@ static int build_rows(struct ff_job *j, int patches, struct ff *whole, struct ff
 		      all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats, sink,
 		                  progress, e);
 	bad = bad || all_lights(&run, &chains, stats, sink, e) || put_chains(whole, &chains, e);
+	whole->chain_most = j->chain_most;
 	for (int t = 0; run.thread && t < threads; t++) {
 		stats->rays += run.thread[t].rays;
 		if (run.thread[t].formula)
@@ -458,7 +456,7 @@ static int build_matrix(struct ff_job *j, struct ff *whole, struct ff_stats *sta
 	if (j->m->light.n)
 		return ff_matrix(j, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
 		       build_rows(j, 0, whole, stats, sink, progress, e) ? -1 : 0;
-	whole->chains = 1;
+	whole->chains = whole->chain_most = 1;
 	whole->chain_start = mem_new(2, sizeof *whole->chain_start, "chains", e);
 	return whole->chain_start ? ff_matrix(j, whole->patch_begin, whole->patch_end, sink, stats,
 	                                      progress, e) : -1;

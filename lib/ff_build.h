@@ -15,10 +15,10 @@ struct ff_options {
 	uint32_t points;      /* hemicube: sample points on a patch */
 	uint32_t emitter_gain;/* rays: this many times the rays for emitters */
 	uint32_t gather;      /* rays: that an element-side gathers with; 0: rows alone */
-	int gather_by_area;   /* 1: fewer if it is less than a fifth of the mean patch, in
-	                         proportion to its area, down to a sixteenth of them */
 	uint32_t lobe_rays;   /* rays spent on the G rows of a patch-side and lobe */
-	uint32_t depth;       /* longest chain of ideal events followed */
+	int centroid;         /* links as in the paper: a direction for each source */
+	uint32_t lobe_depth;  /* lobes in succession that light of a lobe is followed through */
+	uint32_t depth;       /* longest chain of events followed */
 	uint64_t seed;
 	double target;        /* analytic: absolute error of a partly hidden factor */
 	int evaluations;      /* analytic: the most spent on one */

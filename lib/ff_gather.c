@@ -24,7 +24,7 @@ static const double misfit = .25;
 static const double certain = 4;
 
 /* Looking at an element from afar takes so much less time than a ray. */
-enum { LOOKS_A_RAY = 4, ELEMENTS_A_PATCH = 5, RAYS_MIN = 16 };
+enum { LOOKS_A_RAY = 4 };
 
 struct gatherer {
 	const struct ff_job *job;
@@ -46,19 +46,18 @@ struct pair {
 static void cast(struct gatherer *g, uint32_t column, int thread, uint32_t lost[2])
 {
 	const struct ff_job *j = g->job;
-	uint32_t rays = j->gather.rays[column >> 1];
-	const struct ff_samples *samples = &j->of_gathering[rays < j->o.gather];
-	uint32_t begin = (uint32_t)(j->gather.first[column >> 1] % samples->n);
-	uint64_t family = ~(2 * (j->gather.first[column >> 1] / samples->n) + (column & 1));
+	uint32_t element = column >> 1, known = j->of_gathering.n / j->o.gather;
+	uint32_t share = known ? known : 1, begin = element % share * j->o.gather;
+	uint64_t family = ~(uint64_t)(2 * (element / share) + (column & 1));
 	uint64_t seed = rng_mix(rng_mix(j->o.seed + 1) ^ rng_mix(family));
 	uint32_t seeds[FF_DIMS], *hits = g->hits[thread];
 	struct ff_batch_rays b;
 
 	for (int d = 0; d < FF_DIMS; d++)
 		seeds[d] = rng_sobol_seed(seed, d);
-	for (uint32_t first = 0; first < rays; first += RAY_BATCH) {
-		uint32_t n = rays - first < RAY_BATCH ? rays - first : RAY_BATCH;
-		ff_batch_from_element(j, samples, seeds, column, begin + first, n, &b);
+	for (uint32_t first = 0; first < j->o.gather; first += RAY_BATCH) {
+		uint32_t n = j->o.gather - first < RAY_BATCH ? j->o.gather - first : RAY_BATCH;
+		ff_batch_from_element(j, &j->of_gathering, seeds, column, begin + first, n, &b);
 		for (uint32_t i = 0; i < n; i++) {
 			if (b.ray.triangle[i] == RAY_MISS) {
 				lost[0]++;
@@ -77,7 +76,7 @@ static void gather_element(struct gatherer *g, uint32_t patch, uint32_t column, 
 	struct vec *met = &g->met[thread];
 	uint32_t lost[2] = { 0 }, ps = 2 * patch + (column & 1);
 	double part = g->job->m->element_area[column >> 1] /
-	              (g->job->m->patch_area[patch] * g->to->rays[column >> 1]);
+	              (g->job->m->patch_area[patch] * g->job->o.gather);
 
 	met->n = 0;
 	cast(g, column, thread, lost);
@@ -110,60 +109,10 @@ static int is_by_formula(const struct ff_job *j, uint32_t ps)
 	return ff_formula_has(&j->formula, ps) && (j->formula.all || j->emits[ps]);
 }
 
-/* Small patches are not worth more rays for each area than most are. */
-static int takes(const struct ff_job *j, double patch_area, double element_area, uint32_t rays)
+static int takes(const struct ff_job *j, double patch_area, double element_area)
 {
-	double part = j->o.gather_by_area ? fmin(1, patch_area / j->gather.common) : 1;
-
 	return patch_area >= larger * element_area &&
-	       rays * patch_area >= enough * part * j->o.rays * element_area;
-}
-
-/* The next place in the sequence from which n points are as well stratified as n can be,
- * without running over the end of a family of points. */
-static uint64_t align(uint64_t first, uint64_t n, uint64_t points)
-{
-	uint64_t unit = 1;
-
-	while (2 * unit <= n && 2 * unit <= points)
-		unit *= 2;
-	first += (unit - first % unit) % unit;
-	return n <= points && first % points + n > points ? first + points - first % points : first;
-}
-
-/* Plans the rays of elements: o.gather where a patch has ELEMENTS_A_PATCH, fewer where
- * elements are smaller than that. */
-static void plan(struct ff_job *j)
-{
-	const struct model *m = j->m;
-	struct ff_gather *g = &j->gather;
-	double area = 0, square = 0;
-	uint64_t first = 0;
-
-	for (uint32_t p = 0; p < m->patches; p++) {
-		area += m->patch_area[p];
-		square += m->patch_area[p] * m->patch_area[p];
-	}
-	g->common = square / area;
-	for (uint32_t i = 0; i < m->elements; i++) {
-		double want = ELEMENTS_A_PATCH * j->o.gather * m->element_area[i] / g->common;
-		int fewer = 0;
-		while (j->o.gather_by_area && fewer < FF_FEWER && (j->o.gather >> fewer) >= 2 * RAYS_MIN &&
-		       (j->o.gather >> fewer) > want * sqrt(2))
-			fewer++;
-		g->rays[i] = j->o.gather >> fewer;
-	}
-	for (uint32_t p = 0; p < m->patches; p++) {
-		uint64_t all = 0;
-		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++)
-			all += g->rays[i];
-		first = align(first, all, j->of_gathering[0].n);
-		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++) {
-			first = align(first, g->rays[i], j->of_gathering[0].n);
-			g->first[i] = first;
-			first += g->rays[i];
-		}
-	}
+	       j->o.gather * patch_area >= enough * j->o.rays * element_area;
 }
 
 /* Pairs by receiver, in order, become lists by source, in the same order. */
@@ -232,14 +181,11 @@ static int allocate(struct gatherer *g, size_t threads, struct err *e)
 	g->sights = mem_new(2 * g->job->m->elements, sizeof *g->sights, "gathering", e);
 	to->start = mem_new(sides + 1, sizeof *to->start, "gathered light", e);
 	to->centre = mem_new(patches, sizeof *to->centre, "gathered light", e);
-	to->rays = mem_new(g->job->m->elements, sizeof *to->rays, "gathering", e);
-	to->first = mem_new(g->job->m->elements, sizeof *to->first, "gathering", e);
 	to->escape = mem_new(sides, sizeof *to->escape, "gathered light", e);
 	to->black = mem_new(sides, sizeof *to->black, "gathered light", e);
 	for (size_t t = 0; g->hits && t < threads; t++)
 		good &= (g->hits[t] = mem_new(sides, sizeof **g->hits, "gathering", e)) != NULL;
-	return good && g->hits && g->met && g->err && g->pairs && g->sights && to->rays &&
-	       to->first && to->start &&
+	return good && g->hits && g->met && g->err && g->pairs && g->sights && to->start &&
 	       to->centre && to->escape && to->black ? 0 : -1;
 }
 
@@ -264,14 +210,13 @@ static void release(struct gatherer *g, size_t threads)
 static int any_takes(const struct ff_job *j)
 {
 	double most = 0, least = INFINITY;
-	uint32_t rays = j->o.gather;
 
 	for (size_t ps = 0; ps < 2 * j->m->patches; ps++)
 		if (j->shoots_diffuse[ps])
 			most = fmax(most, j->m->patch_area[ps >> 1]);
 	for (size_t i = 0; i < j->m->elements; i++)
 		least = fmin(least, j->m->element_area[i]);
-	return takes(j, most, least, rays);
+	return takes(j, most, least);
 }
 
 /* Rows by formula are made of sights too, whatever their sizes. */
@@ -294,7 +239,6 @@ int ff_gather(struct ff_job *j, double *rays, const struct progress *progress, s
 	bad = allocate(&g, threads, e);
 
 	if (!bad) {
-		plan(j);
 		par_for(j->m->patches, 1, (int)threads, gather_patches, &g, progress);
 		bound_patches(j, j->gather.centre);
 		j->gather.alone = !rows_tell_more(j);
@@ -304,18 +248,16 @@ int ff_gather(struct ff_job *j, double *rays, const struct progress *progress, s
 			bad = err_set(e, "%s", g.err[t].text);
 	for (uint32_t ps = 0; !bad && ps < 2 * j->m->patches; ps++)
 		if (!j->is_black[ps] && !j->is_ideal[ps])
-			for (uint32_t i = j->m->patch_start[ps >> 1]; i < j->m->patch_start[(ps >> 1) + 1]; i++)
-				*rays += j->gather.rays[i];
+			*rays += (double)(j->m->patch_start[(ps >> 1) + 1] - j->m->patch_start[ps >> 1]) *
+			         j->o.gather;
 	bad = bad || transpose(&g, e);
 	release(&g, threads);
-	j->gather.done = !bad;
+	j->gather.rays = bad ? 0 : j->o.gather;
 	return bad ? -1 : 0;
 }
 
 void ff_gather_free(struct ff_gather *g)
 {
-	free(g->rays);
-	free(g->first);
 	free(g->start);
 	free(g->seen);
 	free(g->centre);
@@ -328,8 +270,7 @@ void ff_gather_free(struct ff_gather *g)
 
 static int element_takes(const struct ff_job *j, uint32_t ps, uint32_t column)
 {
-	return takes(j, j->m->patch_area[ps >> 1], j->m->element_area[column >> 1],
-	             j->gather.rays[column >> 1]);
+	return takes(j, j->m->patch_area[ps >> 1], j->m->element_area[column >> 1]);
 }
 
 int ff_row_is_seen(const struct ff_job *j, uint32_t ps)
@@ -358,14 +299,12 @@ static double recall(struct ff_thread *t, uint32_t ps)
 {
 	const struct ff_job *j = t->job;
 	const struct ff_gather *g = &j->gather;
-	double sum = 0;
+	double sum = 0, scale = 1 / (j->m->patch_area[ps >> 1] * g->rays);
 
 	t->sights.n = 0;
 	for (uint64_t i = g->start[ps]; i < g->start[ps + 1]; i++) {
-		uint32_t el = g->seen[i].column >> 1;
-		double n = g->seen[i].count;
-		double one = j->m->element_area[el] / (j->m->patch_area[ps >> 1] * g->rays[el]);
-		struct ff_sight s = { g->seen[i].column, one * n, one * one * n * (1 - n / g->rays[el]) };
+		double n = g->seen[i].count, one = scale * j->m->element_area[g->seen[i].column >> 1];
+		struct ff_sight s = { g->seen[i].column, one * n, one * one * n * (1 - n / g->rays) };
 		if (!element_takes(j, ps, s.column))
 			continue;
 		if (vec_append(&t->sights, &s, 1, sizeof s, &t->tally.err))
@@ -471,9 +410,7 @@ static double landing(const struct ff_thread *t, uint32_t ps, uint32_t cast, dou
 	const struct ff_job *j = t->job;
 	const uint32_t *start = &j->m->patch_start[ps >> 1];
 
-	*rays = cast;
-	for (uint32_t i = start[0]; !cast && i < start[1]; i++)
-		*rays += j->gather.rays[i];
+	*rays = cast ? cast : (double)j->gather.rays * (start[1] - start[0]);
 	return cast ? brought(t, ps, cast) : 1 - j->gather.escape[ps] - j->gather.black[ps];
 }
 

@@ -10,9 +10,8 @@
 #include "ray.h"
 #include "rng.h"
 
-/* FF_CLOSE_RAYS: a power of two that an element close to an emitter casts.
- * FF_FEWER: small elements gather with down to 2^-FF_FEWER of the rays. */
-enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048, FF_FEWER = 0 };
+/* FF_CLOSE_RAYS: a power of two that an element close to an emitter casts. */
+enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048 };
 
 /* An element as a place to send rays from. Points are corner + w1 edge[0] + w2 edge[1],
  * with weights that keep a little clear of the edges. Threes are padded to four. */
@@ -38,12 +37,7 @@ struct ff_gathered {
 };
 
 struct ff_gather {
-	int done;                 /* anything was gathered */
-	uint32_t *rays;           /* [E] of a side: in proportion to its area, as many for each
-	                             area as the patches' rows are to have, but no more than
-	                             o.gather */
-	uint64_t *first;          /* [E] of them, in one sequence for all elements */
-	double common;            /* area-weighted mean area of patches */
+	uint32_t rays;            /* from an element-side; 0: nothing was gathered */
 	int alone;                /* rows tell of nothing but diffuse landings */
 	uint64_t *start;          /* [2P+1] of a patch-side, ordered by place */
 	struct ff_gathered *seen;
@@ -68,9 +62,9 @@ struct ff_job {
 	uint8_t *has_lobe;        /* [2P] light arriving here leaves by a finite lobe */
 	uint8_t *emits;           /* [2P] gives light of its own */
 	uint8_t *is_source;       /* [2P] any light leaves here */
+	uint32_t chain_most;      /* where counts of ideal events of a colour stop */
 	int has_panes, has_ideal; /* any clear pane; any ideal surface */
-	struct ff_samples of_rows[2], of_gathering[2]; /* for as many rays as most cast, and for
-	                                                  fewer */
+	struct ff_samples of_rows, of_gathering;
 	struct tally_places places;
 	struct ff_gather gather;
 	struct ff_formula formula;
@@ -105,8 +99,10 @@ struct ff_thread {
 	struct tally tally;
 	struct rng rng;
 	struct vec captures;      /* struct capture */
+	struct vec pairs;         /* struct capture */
 	int capturing;
 	double capture_weight;    /* of a capture, per weight of the ray */
+	uint32_t lobe_depth;      /* lobes that the row's light is followed through */
 	int bent_only;            /* landings of light that came straight are known */
 	double turned;            /* weight of the others, then */
 	struct capture now;       /* the sample being followed, while capturing */
@@ -121,6 +117,10 @@ struct ff_thread {
 	uint32_t lobes;
 	struct vec chain_map;     /* local -> whole */
 };
+
+/* Sets job->chain_most: as high as keeps chains few, by what a few rays meet. O(depth)
+ * rays. 0, or -1 and e. */
+int ff_find_chain_most(struct ff_job *j, struct err *e);
 
 /* Fills job->element. O(elements). */
 void ff_element_table(struct ff_job *j);
@@ -164,8 +164,9 @@ void ff_batch_from_element(const struct ff_job *j, const struct ff_samples *s,
 /* Unit normal of a side of an element. */
 void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3]);
 
-/* Where a hit lies, from the triangle's corners: exact to the rounding of doubles. */
-void ff_hit_point(const struct model *m, const struct ray_hit *hit, double x[3]);
+/* Where a hit lies, from the triangle's corners, in doubles; clear of its edges by a few
+ * float32 steps of the scene, beyond which light would leave through the seam of a corner. */
+void ff_hit_point(const struct ff_job *j, const struct ray_hit *hit, double x[3]);
 
 /* Follows a ray (origin already off its surface) carrying weight w of the row's
  * flux to where it lands, and on through ideal surfaces; tallies everything. */

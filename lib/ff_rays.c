@@ -1,5 +1,6 @@
 /* Form factors by rays: cosine-distributed directions jointly stratified with the
  * position on the patch (Owen-scrambled Sobol points in four dimensions). */
+#include <math.h>
 #include <string.h>
 
 #include "ff_job.h"
@@ -11,7 +12,9 @@ enum { MAX_SPLITS = 4 };
 struct flight {
 	double org[3], dir[3], w;
 	uint32_t chain;
-	uint32_t passed;   /* ideal surfaces so far */
+	uint32_t round;    /* events of a colour since the chain was last a new one */
+	uint32_t idle;     /* others since the last of these */
+	uint32_t lobes;
 	int tallied;       /* its landing is known already */
 	int bent;          /* it has been turned on its way */
 	int splits;
@@ -30,17 +33,45 @@ static void capture(struct ff_thread *t, uint32_t source, uint32_t chain, double
 		vec_append(&t->captures, &c, 1, sizeof c, &t->tally.err);
 }
 
-void ff_hit_point(const struct model *m, const struct ray_hit *hit, double x[3])
+void ff_hit_point(const struct ff_job *j, const struct ray_hit *hit, double x[3])
 {
-	const uint32_t *corner = &m->triangle[3 * (size_t)hit->triangle];
+	const uint32_t *corner = &j->m->triangle[3 * (size_t)hit->triangle];
+	const double *v[3];
+	double edge[2][3], normal[3], w[3], sum = 0;
 
+	for (int i = 0; i < 3; i++)
+		v[i] = &j->m->vertex[3 * (size_t)corner[i]];
+	v3_sub(v[1], v[0], edge[0]);
+	v3_sub(v[2], v[0], edge[1]);
+	v3_cross(edge[0], edge[1], normal);
+	double least = fmin(.1, 4 * ray_offset(j->rays) / sqrt(v3_length(normal)));
+	for (int i = 0; i < 3; i++)
+		sum += w[i] = fmax(hit->w[i], least);
 	for (int k = 0; k < 3; k++)
-		x[k] = hit->w[0] * m->vertex[3 * (size_t)corner[0] + (size_t)k] +
-		       hit->w[1] * m->vertex[3 * (size_t)corner[1] + (size_t)k] +
-		       hit->w[2] * m->vertex[3 * (size_t)corner[2] + (size_t)k];
+		x[k] = (w[0] * v[0][k] + w[1] * v[1][k] + w[2] * v[2][k]) / sum;
 }
 
-/* Sends a flight on by ideal event `transmitted` from a hit, or books it as cut. */
+/* The direction of a flight that goes on by event `slot`, n the normal of the side it
+ * leaves; returns the part of its weight that does. */
+static double turn(struct ff_thread *t, uint32_t slot, const double in[3], const double n[3],
+                   double out[3])
+{
+	const struct model *m = t->job->m;
+	uint32_t id = t->tally.chains.event[slot];
+	double axis[3] = { in[0], in[1], in[2] };
+
+	if (!(id & 1))
+		v3_mad(in, -2 * v3_dot(in, n), n, axis);
+	if (!t->tally.chains.finite[slot]) {
+		memcpy(out, axis, sizeof axis);
+		return 1;
+	}
+	double u[2] = { rng_uniform(&t->rng), rng_uniform(&t->rng) };
+	return lobe_scatter(m->lobe, (id & 1 ? m->material.beta : m->material.alpha)[id / 2], axis,
+	                    n, u, out);
+}
+
+/* Sends a flight on by event `transmitted` from a hit, or books it as cut. */
 static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_hit *hit,
                  uint32_t element, uint32_t slot, int transmitted, double w,
                  struct flight *out)
@@ -50,29 +81,33 @@ static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_
 
 	if (chain == CHAIN_NONE)
 		return 0;
-	if (in->passed >= t->job->o.depth) {
-		/* A chain that leads back to itself is summed as a series, of which the
-		 * passes so far are sample enough; any other ends here. */
-		if (chain != in->chain)
-			tally_rest(&t->tally, chain)->cut += w;
+	/* A chain that leads back to itself is summed as a series, of which so many rounds
+	 * are sample enough, as many of each ray; a longer chain is not followed. */
+	int coloured = t->tally.chains.most[slot] > 1;
+	uint32_t rounds = t->job->o.depth / 8 * 2 + 2; /* even: two mirrors take turns */
+	out->round = chain == in->chain ? in->round + (uint32_t)coloured : 0;
+	out->idle = coloured ? 0 : in->idle + 1;
+	if (out->round >= rounds || out->idle > t->job->o.depth)
+		return 0;
+	if (chain != in->chain && chains_length(&t->tally.chains, chain) > t->job->o.depth) {
+		tally_rest(&t->tally, chain)->cut += w;
 		return 0;
 	}
 	ff_normal(t->job, element, transmitted ? !hit->side : hit->side, n);
-	ff_hit_point(t->job->m, hit, out->org);
-	for (int k = 0; k < 3; k++)
-		out->dir[k] = in->dir[k];
-	if (!transmitted)
-		v3_mad(in->dir, -2 * v3_dot(in->dir, n), n, out->dir);
+	ff_hit_point(t->job, hit, out->org);
+	double part = turn(t, slot, in->dir, n, out->dir);
+	if (part < 1)
+		tally_rest(&t->tally, chain)->lost += w * (1 - part);
 	ray_leave(t->job->rays, n, out->org);
-	out->w = w;
+	out->w = w * part;
 	out->chain = chain;
-	out->passed = in->passed + 1;
+	out->lobes = in->lobes + t->tally.chains.finite[slot];
 	out->tallied = 0;
-	out->bent = in->bent || !transmitted;
-	return 1;
+	out->bent = in->bent || !transmitted || t->tally.chains.finite[slot];
+	return part > 0;
 }
 
-/* What an ideal surface sends on: 0 to 2 flights into next[]. A surface that both
+/* What a surface sends on directionally: 0 to 2 flights into next[]. A surface that both
  * mirrors and passes splits the flight, the first few times; later one way is drawn
  * and counts double, which keeps the expectation. */
 static int reflect(struct ff_thread *t, const struct flight *in, const struct ray_hit *hit,
@@ -118,10 +153,16 @@ static int land(struct ff_thread *t, const struct flight *f, const struct ray_hi
 		tally_hit(&t->tally, f->chain, 2 * element + side, f->w, f->dir);
 	if (t->capturing)
 		capture(t, ps, f->chain, f->w);
-	if (!j->is_ideal[ps])
+	int lobes_too = j->has_lobe[ps] && f->lobes < t->lobe_depth && (!t->bent_only || f->bent);
+	if (!j->is_ideal[ps] && !lobes_too)
 		return 0;
-	uint32_t id = 4 * model_patch_material(j->m, ps >> 1) + 2 * side;
-	return reflect(t, f, hit, element, &t->tally.chains.slot[id], next);
+	uint32_t id = 4 * model_patch_material(j->m, ps >> 1) + 2 * side, slot[2];
+	for (int way = 0; way < 2; way++) {
+		slot[way] = t->tally.chains.slot[id + (uint32_t)way];
+		if (slot[way] != CHAIN_NONE && t->tally.chains.finite[slot[way]] && !lobes_too)
+			slot[way] = CHAIN_NONE;
+	}
+	return reflect(t, f, hit, element, slot, next);
 }
 
 static uint32_t element_of(const struct ff_job *j, const struct ray_hit *hit)
@@ -276,19 +317,20 @@ static void batch_land(struct ff_thread *t, int side, uint32_t n, const struct f
 	tally_rest(&t->tally, 0)->escape += escaped;
 }
 
-/* Casts `count` rays from a patch-side: Lambertian (exponent < 0) or an emission lobe. */
-static void cast(struct ff_thread *t, uint32_t ps, uint32_t count, double exponent)
+/* Casts `count` rays from a patch-side: Lambertian (exponent < 0) or an emission lobe.
+ * first: replicate that they begin with. */
+static void cast(struct ff_thread *t, uint32_t ps, uint32_t count, double exponent,
+                 uint32_t first_replicate)
 {
 	const struct ff_job *j = t->job;
-	const struct ff_samples *samples = &j->of_rows[count < j->o.rays];
 	uint32_t each = count / FF_REPLICATES;
 	struct ff_batch_rays b;
 
 	for (uint32_t r = 0; r < FF_REPLICATES; r++) {
-		struct ff_scramble s = ff_scramble(j, 2 * ps + (exponent >= 0), r);
+		struct ff_scramble s = ff_scramble(j, 2 * ps + (exponent >= 0), first_replicate + r);
 		for (uint32_t first = 0; first < each; first += RAY_BATCH) {
 			uint32_t n = each - first < RAY_BATCH ? each - first : RAY_BATCH;
-			ff_batch_numbers(samples, s.seed, first, n, &b);
+			ff_batch_numbers(&j->of_rows, s.seed, first, n, &b);
 			ff_batch_elements(j, ps >> 1, n, &b);
 			ff_batch_origins(j, (int)(ps & 1), n, &b);
 			if (exponent < 0)
@@ -329,41 +371,54 @@ static void cast_lobe_ray(struct ff_thread *t, const struct capture *c, int side
 		ff_lobes_cast(t);
 }
 
-/* Rays of a diffuse row: a patch that is smaller than most, as refinement makes them, has as
- * many for its area as these. */
-static uint32_t row_rays(const struct ff_job *j, uint32_t ps)
-{
-	uint32_t rays = j->o.rays, fewer = 0;
-
-	if (j->emits[ps])
-		return rays * j->o.emitter_gain;
-	if (!j->gather.done || !j->o.gather_by_area || j->has_lobe[ps])
-		return rays;
-	while (fewer < FF_FEWER && (rays >> fewer) * j->gather.common >
-	                               rays * j->m->patch_area[ps >> 1] * sqrt(2))
-		fewer++;
-	return rays >> fewer < FF_REPLICATES ? rays : rays >> fewer;
-}
-
 /* The diffuse row of a patch-side into the tally: its own rays, where it needs them, and
  * what was gathered of it, where that is better. */
 static struct ff_weight diffuse(struct ff_thread *t, uint32_t ps)
 {
 	const struct ff_job *j = t->job;
-	uint32_t rays = row_rays(j, ps);
+	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
 	struct ff_weight w = { rays, rays };
-	int gathered = j->gather.done && j->shoots_diffuse[ps];
+	int gathered = j->gather.rays && j->shoots_diffuse[ps];
 	int alone = gathered && ff_row_is_gathered(j, ps);
 
 	if (alone && ff_redistribute(t, ps, 0, &w))
 		return w;
 	t->capturing = j->has_lobe[ps];
 	t->capture_weight = 1;
-	cast(t, ps, rays, -1);
+	cast(t, ps, rays, -1, 0);
 	t->capturing = 0;
 	if (gathered && !alone)
 		ff_redistribute(t, ps, rays, &w);
 	return w;
+}
+
+static int sees_emitter_by_mirror(const struct ff_thread *t)
+{
+	const struct capture *c = t->captures.data;
+
+	for (size_t i = 0; i < t->captures.n; i++)
+		if (c[i].chain && t->job->emits[c[i].source])
+			return 1;
+	return 0;
+}
+
+/* More ways that light comes to a directional patch-side: as many as an emitter's rays
+ * tell, where ideal mirrors and panes bring an emitter's light (ff_links finds out what
+ * comes straight by itself). */
+static int capture_more(struct ff_thread *t, uint32_t ps, struct err *e)
+{
+	const struct ff_job *j = t->job;
+	uint32_t more = j->o.rays * (j->o.emitter_gain - 1);
+	struct ff_batch unused = { 0 };
+
+	if (j->emits[ps] || more == 0 || !sees_emitter_by_mirror(t))
+		return 0;
+	t->capturing = 1;
+	cast(t, ps, more, -1, FF_REPLICATES);
+	t->capturing = 0;
+	int bad = tally_finish(&t->tally, &unused, ps, FF_DIFFUSE, more, more, e);
+	batch_free(&unused);
+	return bad;
 }
 
 static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struct err *e)
@@ -383,11 +438,15 @@ static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struc
 		batch_free(&unused);
 	}
 	if (j->shoots_lobe[ps]) {
-		cast(t, ps, rays, j->m->material.emission_exponent[2 * material + (ps & 1)]);
+		t->lobe_depth = j->o.lobe_depth;
+		cast(t, ps, rays, j->m->material.emission_exponent[2 * material + (ps & 1)], 0);
+		t->lobe_depth = 0;
 		if (tally_finish(&t->tally, b, ps, FF_EMISSION, rays, rays, e))
 			return -1;
 	}
-	return j->has_lobe[ps] ? ff_links(t, ps, cast_lobe_ray, b, e) : 0;
+	if (!j->has_lobe[ps])
+		return 0;
+	return capture_more(t, ps, e) || ff_links(t, ps, cast_lobe_ray, b, e) ? -1 : 0;
 }
 
 int ff_patch_rays(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e)

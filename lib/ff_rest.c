@@ -44,7 +44,7 @@ void ff_rest_cast(struct ff_rest *r, const struct ff_job *j, uint32_t ps, uint32
 		struct ff_scramble s = ff_scramble(j, 2 * ps, k);
 		for (uint32_t first = 0; first < rays / FF_REPLICATES; first += RAY_BATCH) {
 			uint32_t left = rays / FF_REPLICATES - first, n = left < RAY_BATCH ? left : RAY_BATCH;
-			ff_batch_numbers(&j->of_rows[0], s.seed, first, n, &b);
+			ff_batch_numbers(&j->of_rows, s.seed, first, n, &b);
 			ff_batch_elements(j, ps >> 1, n, &b);
 			ff_batch_origins(j, (int)(ps & 1), n, &b);
 			ff_batch_directions(j, (int)(ps & 1), n, &b);

@@ -14,7 +14,7 @@
 #include "common/cli.h"
 
 enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GAIN, OPT_GATHER,
-       OPT_TO, OPT_CLOSE };
+       OPT_TO, OPT_CLOSE, OPT_LOBE_DEPTH, OPT_LINKS };
 enum { GATHER_LEAST = 16 };
 
 static const struct cli_option options[] = {
@@ -26,9 +26,11 @@ static const struct cli_option options[] = {
 	{ OPT_TO, "to", "WHAT", "elements or patches: what receives (default elements)" },
 	{ OPT_CLOSE, "close", NULL, "formulas to patches: change what is in doubt so that closed rows add up" },
 	{ OPT_GAIN, "emitter-gain", "N", "times as many rays for emitters (default 8)" },
-	{ OPT_GATHER, "gather", "N", "rays an element-side gathers with (default a sixteenth of -n, fewer for small elements)" },
+	{ OPT_GATHER, "gather", "N", "rays an element-side gathers with (default a sixteenth of -n)" },
 	{ OPT_LOBE_RAYS, "lobe-rays", "N", "rays a patch-side for each directional lobe (default 4096)" },
-	{ OPT_DEPTH, "depth", "N", "most ideal mirrors and panes a ray is followed through (default 256)" },
+	{ OPT_LINKS, "links", "HOW", "rays or centroid (the paper's): where light comes to a lobe from (default rays)" },
+	{ OPT_LOBE_DEPTH, "lobe-depth", "N", "most lobes that light of a lobe is followed through (default 4)" },
+	{ OPT_DEPTH, "depth", "N", "longest chain of mirrors, panes and lobes that is told apart (default 256)" },
 	{ OPT_PRECISION, "precision", "TYPE", "f32 or f64 (default f32)" },
 	{ OPT_PART, "part", "K/N", "compute the K-th of N shards only" },
 	{ OPT_SEED, "seed", "N", "seed of the sample points (default 1)" },
@@ -76,7 +78,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 	long n = 0, gather = -1;
 	struct ff_options *o = &r->ff;
 
-	*o = (struct ff_options){ .points = 16, .emitter_gain = 8, .lobe_rays = 4096, .depth = 256,
+	*o = (struct ff_options){ .points = 16, .emitter_gain = 8, .lobe_rays = 4096, .lobe_depth = 4, .depth = 256,
 	                          .seed = 1, .method = FF_AUTO, .evaluations = 50000, .part = 1, .parts = 1 };
 	while ((letter = cli_next(c, argc, argv)) != -1) {
 		switch (letter) {
@@ -90,6 +92,8 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		case OPT_GAIN: o->emitter_gain = (uint32_t)cli_integer(c, "--emitter-gain", optarg, 1, 4096); break;
 		case OPT_GATHER: gather = cli_integer(c, "--gather", optarg, 0, 1 << 20); break;
 		case OPT_LOBE_RAYS: o->lobe_rays = (uint32_t)cli_integer(c, "--lobe-rays", optarg, 1, 1 << 26); break;
+		case OPT_LINKS: parse_word(c, "--links", optarg, "centroid", "rays", &o->centroid); break;
+		case OPT_LOBE_DEPTH: o->lobe_depth = (uint32_t)cli_integer(c, "--lobe-depth", optarg, 0, 64); break;
 		case OPT_DEPTH: o->depth = (uint32_t)cli_integer(c, "--depth", optarg, 0, 1000000); break;
 		case OPT_PRECISION: parse_word(c, "--precision", optarg, "f64", "f32", &o->f64); break;
 		case OPT_PART: parse_part(c, optarg, o); break;
@@ -108,12 +112,13 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 	if (!hemicube) {
 		uint32_t least = o->method == FF_RAYS ? 0 : GATHER_LEAST;
 		o->rays = (o->rays + 3) / 4 * 4;
-		o->gather_by_area = gather < 0;
 		o->gather = gather >= 0 ? (uint32_t)gather
 		          : o->rays / 16 >= GATHER_LEAST ? o->rays / 16 : least;
 	}
 	if (o->method == FF_ANALYTIC && o->gather == 0)
 		cli_usage(c, "--gather 0: the formulas of -m analytic need rays of the elements");
+	if (o->centroid)
+		o->lobe_depth = 0;
 	if (o->target == 0)
 		o->target = o->to_patches ? 1e-6 : 1e-4;
 	o->threads = c->threads;
@@ -128,11 +133,11 @@ static json_t *options_json(const struct ff_options *o)
 		"precision", o->f64 ? "f64" : "f32",
 		"part", (json_int_t)o->part, "parts", (json_int_t)o->parts);
 
-	if (o->method != FF_HEMICUBE) {
+	if (o->method != FF_HEMICUBE)
 		json_object_set_new(j, "gather", json_integer(o->gather));
-		json_object_set_new(j, "gather_by_area", json_boolean(o->gather_by_area));
-	}
 	json_object_set_new(j, "emitter_gain", json_integer(o->emitter_gain));
+	json_object_set_new(j, "links", json_string(o->centroid ? "centroid" : "rays"));
+	json_object_set_new(j, "lobe_depth", json_integer(o->lobe_depth));
 	if (o->to_patches)
 		json_object_set_new(j, "to", json_string("patches"));
 	if (o->close)
