@@ -50,7 +50,7 @@ static int get_counts(const struct container *c, struct ff *f, struct err *e)
 }
 
 static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
-                      struct vec *made, struct err *e)
+                      uint32_t **most, struct vec *made, struct err *e)
 {
 	const int f64 = value_type(c) == DT_F64, narrow = column_type(c) == DT_U16;
 	const struct field_or_not field[] = {
@@ -81,6 +81,7 @@ static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
 		{ { &f->link_direction, "link_direction", DT_F32, 2, { f->links, 3 } }, FIELD_EMPTY },
 		{ { &f->link_row, "link_row", DT_U32, 2, { f->links, 2 } }, FIELD_EMPTY },
 		{ { part, "part", DT_U32, 1, { 4 } }, FIELD_NEVER },
+		{ { most, "chain_most", DT_U32, 1, { 1 } }, FIELD_NEVER },
 		{ { narrow ? (void *)&f->column16 : (void *)&f->column, "column",
 		  narrow ? DT_U16 : DT_U32, 1, { f->columns } }, FIELD_NEVER },
 		{ { f64 ? (void *)&f->value64 : (void *)&f->value, "value",
@@ -105,14 +106,15 @@ static int map_ff(struct ff_file *o, struct err *e)
 {
 	const struct container *c = o->container;
 	struct ff *f = &o->f;
-	uint32_t *part = NULL;
+	uint32_t *part = NULL, *most = NULL;
 
-	if (get_receivers(c, f, e) || get_counts(c, f, e) || map_arrays(c, f, &part, &o->made, e))
+	if (get_receivers(c, f, e) || get_counts(c, f, e) || map_arrays(c, f, &part, &most, &o->made, e))
 		return -1;
 	f->patch_begin = part[0];
 	f->patch_end = part[1];
 	f->part = part[2];
 	f->parts = part[3];
+	f->chain_most = *most;
 	return 0;
 }
 

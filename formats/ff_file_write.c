@@ -323,7 +323,7 @@ int ff_file_append(struct ff_writer *w, const struct ff *batch, struct err *e)
 static int put_table(struct ff_writer *w, const struct ff *whole, struct err *e)
 {
 	struct container_writer *c = w->container;
-	const uint64_t starts = whole->chains + 1, events = whole->chain_events, four = 4;
+	const uint64_t starts = whole->chains + 1, events = whole->chain_events, four = 4, one = 1;
 	const uint32_t part[4] = { whole->patch_begin, whole->patch_end, whole->part,
 	                           whole->parts };
 	const uint64_t end[3] = { w->blocks, w->entries, w->arrivals };
@@ -334,6 +334,7 @@ static int put_table(struct ff_writer *w, const struct ff *whole, struct err *e)
 	       container_put(c, "chain_start", DT_U64, 1, &starts, whole->chain_start, e) ||
 	       (events && (container_put(c, "chain_event", DT_U32, 1, &events, whole->chain_event, e) ||
 	                   container_put(c, "chain_count", DT_U32, 1, &events, whole->chain_count, e))) ||
+	       container_put(c, "chain_most", DT_U32, 1, &one, &whole->chain_most, e) ||
 	       container_put(c, "part", DT_U32, 1, &four, part, e) ? -1 : 0;
 }
 

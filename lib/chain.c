@@ -8,8 +8,6 @@
 
 static int rehash(struct chains *c, size_t size, struct err *e);
 
-enum { CHAINS_AIM = 1024, MOST_MAX = 64 };
-
 static int changes_no_colour(const struct materials *mt, uint32_t id)
 {
 	const double *coefficient = id & 1 ? mt->tau_s : mt->rho_s;
@@ -21,40 +19,34 @@ static int changes_no_colour(const struct materials *mt, uint32_t id)
 	return 1;
 }
 
-static void set_most(struct chains *c, const struct materials *mt)
+static void find_events(struct chains *c, const struct materials *mt, uint32_t most)
 {
-	uint32_t coloured = 0, most = 1;
-	double chains;
-
-	for (uint32_t i = 0; i < c->events; i++)
-		coloured += !changes_no_colour(mt, c->event[i]);
-	do {
-		chains = 1;
-		for (uint32_t i = 0; i < coloured; i++)
-			chains *= most + 2;
-		most++;
-	} while (chains <= CHAINS_AIM && most <= MOST_MAX);
-	for (uint32_t i = 0; i < c->events; i++)
-		c->most[i] = changes_no_colour(mt, c->event[i]) ? 1 : most - 1;
+	for (uint32_t id = 0; id < 4 * mt->n; id++) {
+		int side = (int)(id / 2 % 2), transmitted = (int)(id % 2);
+		int ideal = bsdf_has_ideal(mt, id / 4, side, transmitted);
+		int lobe = bsdf_has_lobe(mt, id / 4, side, transmitted);
+		c->slot[id] = CHAIN_NONE;
+		if (!ideal && !lobe)
+			continue;
+		c->slot[id] = c->events;
+		c->finite[c->events] = (uint8_t)lobe;
+		c->most[c->events] = lobe ? UINT32_MAX : changes_no_colour(mt, id) ? 1 : most;
+		c->event[c->events++] = id;
+	}
 }
 
-int chains_init(struct chains *c, const struct model *m, struct err *e)
+int chains_init(struct chains *c, const struct model *m, uint32_t most, struct err *e)
 {
 	size_t ids = 4 * m->material.n;
 
 	*c = (struct chains){ 0 };
-	c->event = mem_new(ids, sizeof *c->event, "ideal events", e);
-	c->slot = mem_new(ids, sizeof *c->slot, "ideal events", e);
-	c->most = mem_new(ids, sizeof *c->most, "ideal events", e);
-	if (!c->event || !c->slot || !c->most)
+	c->event = mem_new(ids, sizeof *c->event, "directional events", e);
+	c->slot = mem_new(ids, sizeof *c->slot, "directional events", e);
+	c->most = mem_new(ids, sizeof *c->most, "directional events", e);
+	c->finite = mem_new(ids, 1, "directional events", e);
+	if (!c->event || !c->slot || !c->most || !c->finite)
 		return -1;
-	for (size_t id = 0; id < ids; id++) {
-		int ideal = bsdf_has_ideal(&m->material, id / 4, (int)(id / 2 % 2), (int)(id % 2));
-		c->slot[id] = ideal ? c->events : CHAIN_NONE;
-		if (ideal)
-			c->event[c->events++] = (uint32_t)id;
-	}
-	set_most(c, &m->material);
+	find_events(c, &m->material, most);
 	uint32_t *none = mem_new(c->events, sizeof *none, "chains", e);
 	/* Rows of no events must have an address too. */
 	int bad = !none || vec_reserve(&c->count, 1, sizeof *none, e) ||
@@ -68,6 +60,7 @@ void chains_free(struct chains *c)
 	free(c->event);
 	free(c->slot);
 	free(c->most);
+	free(c->finite);
 	free(c->count.data);
 	free(c->child.data);
 	free(c->length.data);

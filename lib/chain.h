@@ -1,13 +1,13 @@
-/* Chains of ideal specular events, as multisets with saturating counts.
+/* Chains of directional events, as multisets with saturating counts.
  *
  * Colours multiply, so the order of the events does not matter to the light that
- * comes through: a chain is how often each ideal event was passed. The ideal events
- * of a model are few (one for each material, side and direction with an infinite
- * exponent); so that the chains stay few too, a count stops at a most, where it
- * means "so often or more": one more such event leads back to the same chain, and
- * light that goes round there is summed as a geometric series. Events of
- * coefficient 1 (perfect mirrors) change no colour and count once. Others count
- * so far that a model has about a thousand chains at the most. */
+ * comes through: a chain is how often each directional event was passed. The events
+ * of a model are few (one for each material, side and direction that mirrors or
+ * passes light, ideally or by a lobe); so that the chains stay few too, the count of
+ * an ideal one stops at a most, where it means "so often or more": one more such
+ * event leads back to the same chain, and light that goes round there is summed as a
+ * geometric series. Ideal events of coefficient 1 (perfect mirrors) change no colour
+ * and count once. */
 #ifndef TWOPASS_CHAIN_H
 #define TWOPASS_CHAIN_H
 
@@ -20,9 +20,10 @@
 #define CHAIN_NONE UINT32_MAX
 
 struct chains {
-	uint32_t events;        /* ideal events of the model */
+	uint32_t events;        /* directional events of the model */
 	uint32_t *event;        /* ids, ascending: ff.h */
 	uint32_t *most;         /* [events] where the count stops */
+	uint8_t *finite;        /* [events] a lobe of finite exponent */
 	uint32_t *slot;         /* [4 materials] event id -> index, or CHAIN_NONE */
 	struct vec count;       /* uint32_t [n][events] */
 	struct vec child;       /* uint32_t [n][events], CHAIN_NONE = not made yet */
@@ -32,9 +33,9 @@ struct chains {
 	size_t hash_size;
 };
 
-/* Finds the model's ideal events and makes the empty chain, number 0.
- * 0, or -1 and e. */
-int chains_init(struct chains *c, const struct model *m, struct err *e);
+/* Finds the model's directional events and makes the empty chain, number 0. most: where
+ * counts of ideal events stop that change colours. 0, or -1 and e. */
+int chains_init(struct chains *c, const struct model *m, uint32_t most, struct err *e);
 void chains_free(struct chains *c);
 
 /* The chain with these counts [events], made if new; CHAIN_NONE and e when out

@@ -5,14 +5,17 @@
  * Patch-side = 2 patch + side, element-side = 2 element + side. A punctual light is a
  * source too, numbered behind the patch-sides: 2 patches + light.
  *
- * A BLOCK of a row is what arrives by one CHAIN: the multiset of ideal events
+ * A BLOCK of a row is what arrives by one CHAIN: the multiset of directional events
  * passed on the way (chain 0: none). Values are colourless fractions of the
  * row's flux; every block keeps what left the scene (escape), what met a black
  * back (black), what a reciprocal lobe loses (lost) and what was not followed
- * further (cut). Light that an ideal surface sends on appears again in the
+ * further (cut). Light that a surface sends on directionally appears again in the
  * block of the longer chain, so blocks are not additive: block 0 alone closes,
  *     row_scale (sum of values + escape + black + lost + cut) = 1,
- * and the others close against the ideal entries that feed them.
+ * and the others close against the entries that feed them. Ideal events are followed
+ * in every row, lobes in rows of directional light only: those of emission and of
+ * links. Where a row has no block for light that a lobe sends on, the light goes to a
+ * link.
  *
  * A LINK belongs to a patch-side ("target") with a finite lobe and names a
  * source of light as the target sees it: the patch-sides that the light left (an
@@ -49,6 +52,7 @@ struct ff {
 	size_t chains, chain_events;
 	uint64_t *chain_start;
 	uint32_t *chain_event, *chain_count;
+	uint32_t chain_most;      /* where counts of ideal events of a colour stop */
 
 	size_t rows;
 	uint32_t *row_side;       /* patch-side, or light, that the flux leaves */

@@ -65,6 +65,8 @@ static int check_chains(const struct ff *f, size_t materials, struct err *e)
 {
 	if (f->chains == 0)
 		return err_set(e, "array chain_start: there is no chain 0");
+	if (f->chain_most == 0)
+		return err_set(e, "array chain_most: it is 0");
 	if (check_starts("chain_start", f->chain_start, f->chains, f->chain_events, 0, e) ||
 	    check_below("chain_event", f->chain_event, f->chain_events, 4 * materials, e))
 		return -1;

@@ -70,7 +70,7 @@ static void through_pixel(struct ff_thread *t, const struct view *v, uint32_t it
 		return;
 	}
 	uint32_t ps = 2 * j->m->element_patch[item >> 1] + (item & 1);
-	if (j->is_ideal[ps])
+	if (j->is_ideal[ps] || (j->has_lobe[ps] && t->lobe_depth))
 		ff_follow(t, v->eye, dir, w, 0);
 	else if (!model_side_modelled(j->m, ps))
 		tally_rest(&t->tally, 0)->black += w;
@@ -188,6 +188,7 @@ static void gather_emission(struct ff_thread *t, uint32_t ps, double exponent)
 	uint64_t seed = rng_next(&t->rng);
 	double w = 1. / ((double)n * j->o.points);
 
+	t->lobe_depth = j->o.lobe_depth;
 	for (uint32_t i = 0; i < j->o.points; i++) {
 		const double *normal = t->view[2 * i + (uint32_t)side].frame[2];
 		for (uint32_t k = 0; k < n; k++) {
@@ -199,6 +200,7 @@ static void gather_emission(struct ff_thread *t, uint32_t ps, double exponent)
 		if ((i + 1) * GROUPS % j->o.points == 0)
 			tally_replicate(&t->tally);
 	}
+	t->lobe_depth = 0;
 }
 
 static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struct err *e)

@@ -16,7 +16,7 @@ enum {
 	POINTS_FIRST = 32,      /* that look from an element; all if they differ */
 	POINTS_LEAST = 256,
 	POINTS_PART = 16,       /* one over this of a patch-side's rays */
-	CAPTURES = 64,          /* of a directional patch-side, for each light */
+	CAPTURES = 1024,        /* of a directional patch-side, for each light */
 	BENT_GAIN = 8           /* times an emitter's rays where light is turned */
 };
 
@@ -72,7 +72,7 @@ static uint32_t clear_way(struct ff_thread *t, const double from[3], const doubl
 		                     &t->tally.err);
 		ff_normal(j, locate(&j->locator, hit.triangle, (float)hit.w[1], (float)hit.w[2]),
 		          (int)arrival, n);
-		ff_hit_point(j->m, &hit, org);
+		ff_hit_point(j, &hit, org);
 		ray_leave(j->rays, n, org);
 	}
 	return CHAIN_NONE;
@@ -223,6 +223,7 @@ static uint32_t cast(struct ff_thread *t, size_t light)
 	uint32_t rays = n < UINT32_MAX ? (uint32_t)n : UINT32_MAX;
 
 	t->bent_only = 1;
+	t->lobe_depth = j->o.lobe_depth;
 	t->turned = 0;
 	t->rng = rng_seed(j->o.seed, model_sources(j->m) + light);
 	for (uint32_t i = 0; i < rays; i++) {
@@ -232,6 +233,7 @@ static uint32_t cast(struct ff_thread *t, size_t light)
 		ff_follow(t, org, dir, 1, 0);
 	}
 	t->bent_only = 0;
+	t->lobe_depth = 0;
 	return rays;
 }
 

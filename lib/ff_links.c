@@ -2,15 +2,19 @@
  * directional patch-side sees.
  *
  * The paper takes one direction from a source patch to the directional patch and
- * weighs the hemicube with cos^k about its mirror image. Here the pair of patches
- * is sampled: each sample has its own point and direction, distributed as the
- * diffuse light that really comes from that source (the patch-side's own rays,
- * read backwards), and the lobe about ITS mirrored direction is sampled with
- * density cos^k over the whole lobe. Thus no direction is quantised, the
- * normaliser is never a sum that can miss (eq. 3 with its sum over everything the
- * lobe sees), and any exponent works alike. */
+ * weighs the hemicube with cos^k about its mirror image (o.centroid does so, but for
+ * the sum). Here the pair of patches is sampled: each sample has its own point and
+ * direction, distributed as the diffuse light that really comes from that source (the
+ * patch-side's own rays, read backwards, or lines to an emitter), and the lobe about
+ * ITS mirrored direction is sampled with density cos^k over the whole lobe. Thus no
+ * direction is quantised, the normaliser is never a sum that can miss (eq. 3 with its
+ * sum over everything the lobe sees), and any exponent works alike.
+ *
+ * A link is right for light that leaves its source evenly. Light that leaves a lobe does
+ * not: its rays are followed on from where they land, through further lobes. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "bsdf.h"
 #include "ff_job.h"
@@ -61,45 +65,94 @@ static int sort_captures(struct ff_thread *t, struct err *e)
 	return 0;
 }
 
+/* A point of a patch-side to draw a line from: with hemicubes, where one of them stands. */
+static void line_begin(const struct ff_thread *t, uint32_t ps, uint32_t i, uint64_t seed,
+                       struct capture *c)
+{
+	const struct ff_job *j = t->job;
+
+	c->view = i % j->o.points;
+	if (j->o.method == FF_HEMICUBE) {
+		const struct view *v = &t->view[2 * c->view + (ps & 1)];
+		c->element = v->element;
+		memcpy(c->x, v->eye, sizeof c->x);
+	} else {
+		c->element = ff_point(j, ps >> 1, rng_sobol(i, 0, seed), rng_sobol(i, 1, seed), c->x);
+	}
+}
+
+/* Straight lines `begin` to `end` from a patch-side to a source: those that are clear are
+ * appended as captures that weigh what light of the source comes along them. */
+static int probe(struct ff_thread *t, uint32_t ps, uint32_t source, uint32_t begin,
+                 uint32_t end, struct vec *to, struct err *e)
+{
+	const struct ff_job *j = t->job;
+	uint64_t seed = rng_mix(j->o.seed ^ (((uint64_t)ps << 32) | source));
+
+	for (uint32_t i = begin; i < end; i++) {
+		struct capture c = { .source = source };
+		double y[3], nx[3], ny[3];
+		line_begin(t, ps, i, seed, &c);
+		uint32_t el = ff_point(j, source >> 1, rng_sobol(i, 2, seed), rng_sobol(i, 3, seed), y);
+		ff_normal(j, c.element, (int)(ps & 1), nx);
+		ff_normal(j, el, (int)(source & 1), ny);
+		v3_sub(y, c.x, c.l);
+		double r2 = v3_dot(c.l, c.l), cx = v3_dot(c.l, nx), cy = -v3_dot(c.l, ny);
+		if (!(cx > 0 && cy > 0))
+			continue;
+		double from[3] = { c.x[0], c.x[1], c.x[2] };
+		ray_leave(j->rays, nx, from);
+		ray_leave(j->rays, ny, y);
+		t->rays++;
+		if (ray_blocked(j->rays, from, y))
+			continue;
+		v3_normalise(c.l);
+		c.w = cx * cy / (r2 * r2);
+		if (vec_append(to, &c, 1, sizeof c, e))
+			return -1;
+	}
+	return 0;
+}
+
 /* Tries a few straight lines from the patch-side to every emitter that none of its
- * rays met by chain 0, and captures those that are clear: a small lamp far away may
- * well be missed, yet its highlight is what is seen. O(emitters). */
+ * rays met by chain 0: a small lamp far away may well be missed, yet its highlight is
+ * what is seen. O(emitters). */
 static int probe_unseen(struct ff_thread *t, uint32_t ps, const uint8_t *met, struct err *e)
 {
 	const struct ff_job *j = t->job;
 
-	for (uint32_t q = 0; q < 2 * j->m->patches; q++) {
-		if (met[q] || !j->emits[q] || q >> 1 == ps >> 1)
-			continue;
-		uint64_t seed = rng_mix(j->o.seed ^ (((uint64_t)ps << 32) | q));
-		for (uint32_t i = 0; i < PROBES; i++) {
-			struct capture c = { .source = q, .view = i % j->o.points };
-			double y[3], nx[3], ny[3], r2, cx, cy;
-			c.element = ff_point(j, ps >> 1, rng_sobol(i, 0, seed),
-			                     rng_sobol(i, 1, seed), c.x);
-			uint32_t el = ff_point(j, q >> 1, rng_sobol(i, 2, seed),
-			                       rng_sobol(i, 3, seed), y);
-			ff_normal(j, c.element, (int)(ps & 1), nx);
-			ff_normal(j, el, (int)(q & 1), ny);
-			v3_sub(y, c.x, c.l);
-			r2 = v3_dot(c.l, c.l);
-			cx = v3_dot(c.l, nx);
-			cy = -v3_dot(c.l, ny);
-			if (!(cx > 0 && cy > 0))
-				continue;
-			double from[3] = { c.x[0], c.x[1], c.x[2] };
-			ray_leave(j->rays, nx, from);
-			ray_leave(j->rays, ny, y);
-			t->rays++;
-			if (ray_blocked(j->rays, from, y))
-				continue;
-			v3_normalise(c.l);
-			c.w = cx * cy / (r2 * r2);
-			if (vec_append(&t->captures, &c, 1, sizeof c, e))
-				return -1;
-		}
-	}
+	for (uint32_t q = 0; q < 2 * j->m->patches; q++)
+		if (!met[q] && j->emits[q] && q >> 1 != ps >> 1 &&
+		    probe(t, ps, q, 0, PROBES, &t->captures, e))
+			return -1;
 	return 0;
+}
+
+/* How many captures of equal weight these are worth. */
+static double worth(const struct capture *c, size_t n)
+{
+	double sum = 0, squares = 0;
+
+	for (size_t i = 0; i < n; i++) {
+		sum += c[i].w;
+		squares += c[i].w * c[i].w;
+	}
+	return squares > 0 ? sum * sum / squares : 0;
+}
+
+/* Captures of an emitter that is seen straight: a line for each lobe ray, or the n that
+ * there are already where they are worth more (a large emitter near by). */
+static const struct capture *straight_captures(struct ff_thread *t, uint32_t ps,
+                                               const struct capture *c, size_t *n,
+                                               uint32_t rays, struct err *e)
+{
+	t->pairs.n = 0;
+	if (probe(t, ps, c->source, 0, rays, &t->pairs, e))
+		return NULL;
+	if (worth(t->pairs.data, t->pairs.n) <= worth(c, *n))
+		return c;
+	*n = t->pairs.n;
+	return t->pairs.data;
 }
 
 /* Captures without a source of their own: the patch-side's hemisphere in bins of
@@ -139,7 +192,7 @@ static int bin_captures(struct ff_thread *t, uint32_t ps, struct err *e)
 static void cast_one(struct ff_thread *t, const struct capture *c, int side, int transmitted,
                      double exponent, const double u[2], ff_cast_fn *cast)
 {
-	double n[3], axis[3], dir[3], w = 1;
+	double n[3], axis[3], dir[3];
 	int out = transmitted ? !side : side;
 
 	ff_normal(t->job, c->element, out, n);
@@ -147,20 +200,70 @@ static void cast_one(struct ff_thread *t, const struct capture *c, int side, int
 	if (transmitted)
 		for (int k = 0; k < 3; k++)
 			axis[k] = -c->l[k];
-	if (t->job->m->lobe == LOBE_PAPER) {
-		lobe_sample(exponent, axis, n, u, dir);
-	} else {
-		lobe_sample_whole(exponent, axis, u, dir);
-		double ci = v3_dot(axis, n), co = v3_dot(dir, n);
-		w = co <= 0 ? 0 : co / fmax(ci, co);
-		tally_rest(&t->tally, 0)->lost += 1 - w;
-	}
+	double w = lobe_scatter(t->job->m->lobe, exponent, axis, n, u, dir);
+	tally_rest(&t->tally, 0)->lost += 1 - w;
 	if (w > 0)
 		cast(t, c, out, dir, w);
 }
 
+static int is_light(const struct ff_job *j, uint32_t source)
+{
+	return source >= 2 * j->m->patches;
+}
+
+static void centroid(const struct model *m, uint32_t patch, double c[3])
+{
+	memset(c, 0, 3 * sizeof *c);
+	for (uint32_t el = m->patch_start[patch]; el < m->patch_start[patch + 1]; el++)
+		for (int k = 0; k < 3; k++)
+			v3_mad(c, m->element_area[el] / (3 * m->patch_area[patch]),
+			       &m->vertex[3 * (size_t)m->element[3 * (size_t)el + (size_t)k]], c);
+}
+
+static void mean_direction(const struct capture *c, size_t n, double mean[3])
+{
+	memset(mean, 0, 3 * sizeof *mean);
+	for (size_t i = 0; i < n; i++)
+		v3_mad(mean, c[i].w, c[i].l, mean);
+	v3_normalise(mean);
+}
+
+/* Captures as the paper has them: light comes from the source's centroid to that of the
+ * patch, all over which it is alike. By a mirror, from a punctual light, or from a source
+ * whose centroid is below the horizon, it comes from the mean of the captures c. */
+static const struct capture *centroid_captures(struct ff_thread *t, uint32_t ps,
+                                               const struct capture *c, size_t *n,
+                                               uint32_t rays, struct err *e)
+{
+	const struct ff_job *j = t->job;
+	uint64_t seed = rng_mix(j->o.seed ^ ps);
+	double from[3], to[3], l[3], normal[3];
+
+	mean_direction(c, *n, l);
+	if (c->chain == 0 && !is_light(j, c->source)) {
+		centroid(j->m, c->source >> 1, from);
+		centroid(j->m, ps >> 1, to);
+		v3_sub(from, to, from);
+		ff_normal(j, c->element, (int)(ps & 1), normal);
+		if (v3_dot(from, normal) > 0)
+			memcpy(l, from, sizeof l);
+	}
+	v3_normalise(l);
+	t->pairs.n = 0;
+	for (uint32_t i = 0; i < rays; i++) {
+		struct capture all = { .source = c->source, .chain = c->chain, .w = 1 };
+		line_begin(t, ps, i, seed, &all);
+		memcpy(all.l, l, sizeof l);
+		if (vec_append(&t->pairs, &all, 1, sizeof all, e))
+			return NULL;
+	}
+	*n = rays;
+	return t->pairs.data;
+}
+
 /* The G row of one link and lobe: `rays` rays, shared out among its captures in
- * proportion to their weights (systematic resampling). */
+ * proportion to their weights. (At even steps through captures of a sequence, weights
+ * that alternate would be in step with them.) */
 static int lobe_row(struct ff_thread *t, uint32_t ps, const struct capture *c, size_t n,
                     int transmitted, uint32_t rays, ff_cast_fn *cast, struct ff_batch *b,
                     struct err *e)
@@ -176,14 +279,16 @@ static int lobe_row(struct ff_thread *t, uint32_t ps, const struct capture *c, s
 	for (size_t i = 0; i < n; i++)
 		sum += c[i].w;
 	cumulated = c[0].w;
+	t->lobe_depth = t->job->o.lobe_depth;
 	for (uint32_t i = 0; i < rays; i++) {
-		double u[2] = { rng_sobol(i, 0, seed), rng_sobol(i, 1, seed) };
-		double want = (i + .5) / rays * sum;
+		double u[2] = { rng_sobol(i, 4, seed), rng_sobol(i, 5, seed) };
+		double want = (i + rng_uniform(&t->rng)) / rays * sum;
 		while (at + 1 < n && cumulated < want)
 			cumulated += c[++at].w;
 		cast_one(t, &c[at], side, transmitted, exponent, u, cast);
 	}
 	ff_lobes_cast(t);
+	t->lobe_depth = 0;
 	return tally_finish(&t->tally, b, (ps & ~1u) | (uint32_t)out,
 	                    transmitted ? FF_TRANSMITTED : FF_REFLECTED, rays, rays, e);
 }
@@ -193,12 +298,10 @@ static int put_link(struct ff_thread *t, uint32_t ps, const struct capture *c, s
 {
 	const struct materials *mt = &t->job->m->material;
 	uint32_t material = model_patch_material(t->job->m, ps >> 1), row[2];
-	double mean[3] = { 0 };
+	double mean[3];
 	float direction[3];
 
-	for (size_t i = 0; i < n; i++)
-		v3_mad(mean, c[i].w, c[i].l, mean);
-	v3_normalise(mean);
+	mean_direction(c, n, mean);
 	for (int k = 0; k < 3; k++)
 		direction[k] = (float)mean[k];
 	for (int transmitted = 0; transmitted < 2; transmitted++) {
@@ -258,7 +361,8 @@ static size_t cluster_end(const struct ff_job *j, const struct capture *c, size_
 	while (end < n && c[end].chain == c[i].chain) {
 		uint32_t source = c[end].source;
 		if (source != c[i].source &&
-		    (*w >= enough || ff_emits(j, source) || ff_emits(j, c[i].source) ||
+		    (j->o.centroid || *w >= enough || ff_emits(j, source) ||
+		     ff_emits(j, c[i].source) ||
 		     v3_dot(c[end].l, c[i].l) < narrow))
 			break;
 		while (end < n && c[end].chain == c[i].chain && c[end].source == source)
@@ -316,7 +420,13 @@ int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch
 		double w = 0;
 		end = cluster_end(j, c, i, t->captures.n, all / CLUSTER_SHARE, &w);
 		uint32_t rays = cluster_rays(j, &c[i], all > 0 ? w / all : 0, emitters);
-		bad = put_link(t, ps, &c[i], end - i, rays, cast, b, e);
+		size_t many = end - i;
+		const struct capture *of = &c[i];
+		if (j->o.centroid)
+			of = centroid_captures(t, ps, of, &many, rays, e);
+		else if (of->chain == 0 && !is_light(j, of->source) && j->emits[of->source])
+			of = straight_captures(t, ps, of, &many, rays, e);
+		bad = !of || put_link(t, ps, of, many, rays, cast, b, e);
 		c = t->captures.data;
 	}
 	return bad ? bad : bin_links(t, ps, cast, b, e);

@@ -70,13 +70,13 @@ void tally_places_free(struct tally_places *p)
 }
 
 int tally_init(struct tally *t, const struct model *m, const struct tally_places *places,
-               const uint8_t *has_lobe, struct err *e)
+               const uint8_t *has_lobe, uint32_t chain_most, struct err *e)
 {
 	size_t sides = 2 * m->elements;
 
 	*t = (struct tally){ .m = m, .places = places, .has_lobe = has_lobe,
 	                     .far_most = FAR_MOST, .words = (sides + 4095) / 4096 };
-	if (chains_init(&t->chains, m, e))
+	if (chains_init(&t->chains, m, chain_most, e))
 		return -1;
 	t->count = mem_new(sides, sizeof *t->count, "row tally", e);
 	t->dense = mem_new(sides, sizeof *t->dense, "row tally", e);

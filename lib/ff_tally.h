@@ -69,8 +69,9 @@ int tally_places_init(struct tally_places *p, const struct model *m, const uint8
                       struct err *e);
 void tally_places_free(struct tally_places *p);
 
+/* chain_most: see chain.h. */
 int tally_init(struct tally *t, const struct model *m, const struct tally_places *places,
-               const uint8_t *has_lobe, struct err *e);
+               const uint8_t *has_lobe, uint32_t chain_most, struct err *e);
 void tally_free(struct tally *t);
 
 static inline void tally_see(struct tally *t, uint32_t place)

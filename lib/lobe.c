@@ -157,6 +157,18 @@ void lobe_sample(double k, const double axis[3], const double n[3], const double
 		v3_mad(out, -2 * v3_dot(n, out), n, out);
 }
 
+double lobe_scatter(enum lobe_kind kind, double k, const double axis[3], const double n[3],
+                    const double u[2], double out[3])
+{
+	if (kind == LOBE_PAPER) {
+		lobe_sample(k, axis, n, u, out);
+		return 1;
+	}
+	lobe_sample_whole(k, axis, u, out);
+	double ci = v3_dot(axis, n), co = v3_dot(out, n);
+	return co <= 0 ? 0 : co / fmax(ci, co);
+}
+
 void lobe_sample_cosine(const double n[3], const double u[2], double out[3])
 {
 	in_frame(n, sqrt(u[0]), sqrt(1 - u[0]), 2 * pi * u[1], out);

@@ -34,6 +34,12 @@ void lobe_sample(double k, const double axis[3], const double n[3], const double
  * hemisphere about the axis; out may lie below the horizon. */
 void lobe_sample_whole(double k, const double axis[3], const double u[2], double out[3]);
 
+/* A direction in which a model's lobe sends light on that arrives along an axis at the
+ * same angle to n as the axis has, and what part of it: the rest is lost (reciprocal
+ * lobes; 0 below the horizon). */
+double lobe_scatter(enum lobe_kind kind, double k, const double axis[3], const double n[3],
+                    const double u[2], double out[3]);
+
 /* Cosine-weighted direction about the unit normal n (density cos/pi). */
 void lobe_sample_cosine(const double n[3], const double u[2], double out[3]);
 

@@ -1,14 +1,14 @@
 #include "rng.h"
 
-/* Direction numbers of dimensions 1 to 4 (dimension 0 is bit reversal), from
+/* Direction numbers of dimensions 1 to 5 (dimension 0 is bit reversal), from
  * the primitive polynomials and initial values of new-joe-kuo-6. */
 static const struct {
 	int s;
-	uint32_t a, m[3];
+	uint32_t a, m[4];
 } joe_kuo[] = { { 1, 0, { 1 } }, { 2, 1, { 1, 3 } }, { 3, 1, { 1, 3, 1 } },
-	{ 3, 2, { 1, 1, 1 } } };
+	{ 3, 2, { 1, 1, 1 } }, { 4, 1, { 1, 1, 3, 3 } } };
 
-static uint32_t direction[5][32];
+static uint32_t direction[6][32];
 
 static void fill_directions(void) __attribute__((constructor));
 
@@ -16,7 +16,7 @@ static void fill_directions(void)
 {
 	for (int i = 0; i < 32; i++)
 		direction[0][i] = 1u << (31 - i);
-	for (int d = 1; d < 5; d++) {
+	for (int d = 1; d < 6; d++) {
 		int s = joe_kuo[d - 1].s;
 		uint32_t a = joe_kuo[d - 1].a, *v = direction[d];
 		for (int i = 0; i < 32; i++) {

@@ -37,7 +37,7 @@ static inline double rng_uniform(struct rng *r)
 	return ((double)(rng_next(r) >> 12) + .5) * 0x1p-52;
 }
 
-/* Coordinate `dim` (0 to 4) of point `index` of the Sobol sequence, scrambled
+/* Coordinate `dim` (0 to 5) of point `index` of the Sobol sequence, scrambled
  * by a nested uniform (Owen) scramble chosen by `seed`; in [0, 1) with 32 bits.
  * Points of one seed are jointly stratified over all dimensions. Direction
  * numbers: Joe & Kuo 2008; scramble by hashing: Laine & Karras 2011, with

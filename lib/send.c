@@ -118,18 +118,19 @@ static void into_chain(struct sender *s, uint32_t chain, const double *x, const 
 		flux[c] += x[c] * part[c % (size_t)s->bands];
 }
 
-/* Flux x of chain c on ideal patch-side: what goes on by R and by T. Chains that no
- * sample of the row followed stay in chain_flux and end up as cut. */
-static void go_on(struct sender *s, uint32_t chain, uint32_t material, int side,
+/* Flux x of a chain on a patch-side: what goes on by R and by T, by lobes too if these are
+ * followed. Chains that no sample of the row followed stay in chain_flux and end up as
+ * cut. */
+static void go_on(struct sender *s, uint32_t chain, uint32_t surface, int lobes,
                   const double *x)
 {
 	const struct materials *mt = &s->m->material;
 	const struct chains *c = &s->t->chains;
-	size_t at = material_at(mt, material, side);
+	size_t at = material_at(mt, surface >> 1, (int)(surface & 1));
 
 	for (int transmitted = 0; transmitted < 2; transmitted++) {
-		uint32_t slot = c->slot[4 * material + 2 * (uint32_t)side + (uint32_t)transmitted];
-		if (slot == CHAIN_NONE)
+		uint32_t slot = c->slot[2 * surface + (uint32_t)transmitted];
+		if (slot == CHAIN_NONE || (c->finite[slot] && !lobes))
 			continue;
 		uint32_t child = ((const uint32_t *)c->child.data)[(size_t)chain * c->events + slot];
 		if (child == chain) /* summed by go_round */
@@ -202,6 +203,8 @@ static ALWAYS_INLINE void land_special(const struct landing l, uint64_t run,
 	l.s->unshot_diffuse[(target ^ 1) * l.n + l.v] += other;
 	sum->kept[0] += same + other;
 	sum->absorbed[0] += part[PART_ABSORBED * l.n] * x;
+	if (link == RUN_FOLLOWED)
+		return;
 	if (link == FF_NO_ROW) {
 		sum->cut += lobes;
 		return;
@@ -254,7 +257,8 @@ static void send_block(struct sender *s, const struct block *block, int freshnes
 	            (double)(end - block->special) * sizeof *t->run_link;
 }
 
-/* What goes on from a block's ideal runs when x is its flux by unit of the values. */
+/* What goes on from the runs of a block that are followed, x its flux by unit of the
+ * values. */
 static void send_on(struct sender *s, const struct block *block, const double *x)
 {
 	const struct transport *t = s->t;
@@ -262,9 +266,10 @@ static void send_on(struct sender *s, const struct block *block, const double *x
 
 	for (uint64_t i = block->ideal; i < block[1].run; i++) {
 		uint32_t surface = s->surface[t->run_target[i]];
+		uint32_t link = t->run_link[block->link + (i - block->special)];
 		for (size_t c = 0; c < s->channels; c++)
 			landed[c] = x[c] * t->run_sum[i];
-		go_on(s, block->chain, surface >> 1, (int)(surface & 1), landed);
+		go_on(s, block->chain, surface, link == RUN_FOLLOWED, landed);
 	}
 }
 

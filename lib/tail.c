@@ -7,7 +7,10 @@
  * T D_k <= q D_k everywhere in a connected component with q < 1, all that is still to
  * come is at most q / (1 - q) D_k there. D_k tends to the dominant eigenvector of T, for
  * which this is sharp (the quotients of Collatz and Wielandt: Varga, Matrix Iterative
- * Analysis, sec. 2.1). */
+ * Analysis, sec. 2.1).
+ *
+ * Where a row itself follows what a side's lobes send on, its later blocks count that: the
+ * side then counts with what its other reflections do. So N and D have two values a side. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,8 +31,8 @@ struct tail {
 	const struct components *parts;
 	double *in;           /* [blocks][bands] flux by each block of unit flux, over its sum */
 	double *row;          /* [rows][bands] what a row makes of D, or of 1 + N */
-	lanes *d;             /* [2P][vectors] D */
-	lanes *n;             /* [2P][vectors] N, later 1 + N */
+	lanes *d;             /* [2][2P][vectors] D: of all reflections, of all but lobes */
+	lanes *n;             /* the same of N, later 1 + N */
 	double *ratio;        /* [components] q */
 	double bytes;         /* of runs read */
 };
@@ -54,10 +57,16 @@ static void unit_rows(struct tail *x, struct sender *sender)
 static lanes block_step(const struct tail *x, const lanes *of, uint64_t b, size_t v)
 {
 	const struct transport *t = x->t;
+	const struct block *block = &t->block[b];
+	const lanes *without = of + 2 * t->m->patches * x->vectors;
 	lanes sum = { 0 };
 
-	for (uint64_t i = t->block[b].run; i < t->block[b + 1].run; i++)
+	for (uint64_t i = block->run; i < block->ideal; i++)
 		sum += t->run_sum[i] * of[t->run_target[i] * x->vectors + v];
+	for (uint64_t i = block->ideal; i < block[1].run; i++) {
+		int followed = t->run_link[block->link + (i - block->special)] == RUN_FOLLOWED;
+		sum += t->run_sum[i] * (followed ? without : of)[t->run_target[i] * x->vectors + v];
+	}
 	return sum;
 }
 
@@ -94,8 +103,9 @@ static void all_rows(struct tail *x, const lanes *of, int threads)
 	            (sizeof *x->t->run_target + sizeof *x->t->run_sum);
 }
 
-/* What x->row has of the rows that flux arriving on a side leaves by. */
-static double side_step(const struct tail *x, uint32_t ps, size_t k)
+/* What x->row has of the rows that flux arriving on a side leaves by, with lobes or
+ * without. */
+static double side_step(const struct tail *x, uint32_t ps, int lobes, size_t k)
 {
 	const struct transport *t = x->t;
 	const struct materials *mt = &t->m->material;
@@ -107,7 +117,7 @@ static double side_step(const struct tail *x, uint32_t ps, size_t k)
 		sum += mt->rho_d[at] * x->row[t->diffuse_row[ps] * x->bands + k];
 	if (t->diffuse_row[ps ^ 1] != FF_NO_ROW)
 		sum += mt->tau_d[at] * x->row[t->diffuse_row[ps ^ 1] * x->bands + k];
-	for (uint64_t l = 2 * t->target_link[ps]; l < 2 * t->target_link[ps + 1]; l++)
+	for (uint64_t l = 2 * t->target_link[ps]; lobes && l < 2 * t->target_link[ps + 1]; l++)
 		if (t->link_row[l] != FF_NO_ROW)
 			lobe[l & 1] = fmax(lobe[l & 1], x->row[t->link_row[l] * x->bands + k]);
 	return sum + mt->rho_s[at] * lobe[0] + mt->tau_s[at] * lobe[1];
@@ -119,12 +129,14 @@ static void sides_step(struct tail *x)
 	const struct model *m = x->t->m;
 
 	memset(x->ratio, 0, x->parts->n * sizeof *x->ratio);
-	for (uint32_t ps = 0; ps < 2 * m->patches; ps++) {
-		double *d = (double *)(x->d + ps * x->vectors);
-		double *n = (double *)(x->n + ps * x->vectors);
+	for (size_t i = 0; i < 4 * m->patches; i++) {
+		uint32_t ps = (uint32_t)(i % (2 * m->patches));
+		double *d = (double *)(x->d + i * x->vectors);
+		double *n = (double *)(x->n + i * x->vectors);
 		double *ratio = &x->ratio[x->parts->of[ps]];
 		for (size_t k = 0; k < x->bands; k++) {
-			double next = model_side_modelled(m, ps) ? side_step(x, ps, k) : 0;
+			double next = model_side_modelled(m, ps)
+			            ? side_step(x, ps, i < 2 * m->patches, k) : 0;
 			if (next > 0)
 				*ratio = fmax(*ratio, next / d[k]);
 			d[k] = next;
@@ -139,11 +151,11 @@ static double remainder_of(struct tail *x, int add)
 {
 	double worst = 0;
 
-	for (uint32_t ps = 0; ps < 2 * x->t->m->patches; ps++)
+	for (size_t i = 0; i < 4 * x->t->m->patches; i++)
 		for (size_t k = 0; k < x->bands; k++) {
-			double d = ((double *)(x->d + ps * x->vectors))[k];
-			double *n = (double *)(x->n + ps * x->vectors) + k;
-			double q = x->ratio[x->parts->of[ps]];
+			double d = ((double *)(x->d + i * x->vectors))[k];
+			double *n = (double *)(x->n + i * x->vectors) + k;
+			double q = x->ratio[x->parts->of[i % (2 * x->t->m->patches)]];
 			double rest = !(d > 0) ? 0 : q < 1 ? d * q / (1 - q) : INFINITY;
 			worst = fmax(worst, isfinite(rest) ? rest / (1 + *n + rest) : INFINITY);
 			if (add)
@@ -155,7 +167,7 @@ static double remainder_of(struct tail *x, int add)
 /* 1 + N. 0 if it has no bound. */
 static int arrivals(struct tail *x, int threads)
 {
-	const size_t all = 2 * x->t->m->patches * x->vectors;
+	const size_t all = 4 * x->t->m->patches * x->vectors;
 	double rest = INFINITY, before;
 
 	for (size_t i = 0; i < all; i++)
@@ -224,8 +236,8 @@ double radiosity_tail_bound(const struct transport *t, const struct components *
 	x.in = mem_new(t->blocks, bands * sizeof(double), "bound", &e);
 	x.row = mem_new(t->rows, bands * sizeof(double), "bound", &e);
 	x.ratio = mem_new(parts->n, sizeof *x.ratio, "bound", &e);
-	x.d = lanes_new(2 * t->m->patches * x.vectors, &room[0], "bound", &e);
-	x.n = lanes_new(2 * t->m->patches * x.vectors, &room[1], "bound", &e);
+	x.d = lanes_new(4 * t->m->patches * x.vectors, &room[0], "bound", &e);
+	x.n = lanes_new(4 * t->m->patches * x.vectors, &room[1], "bound", &e);
 	if (sender_init(&sender, t, 1, &e) == 0 && x.in && x.row && x.ratio && x.d && x.n) {
 		unit_rows(&x, &sender);
 		if (arrivals(&x, threads)) {

@@ -87,7 +87,7 @@ static int size_arrays(struct transport *t, struct err *e)
 		t->blocks += t->shard[i]->blocks;
 		t->links += t->shard[i]->links;
 	}
-	if (t->links >= RUN_GUESSED)
+	if (t->links >= RUN_GUESSED - 2)
 		return err_set(e, "more than 2^31 links between directional patches; use larger "
 		               "patches (mesh -p)");
 	t->row_side = mem_new(t->rows, sizeof *t->row_side, "rows", e);
@@ -244,6 +244,7 @@ struct pass {
 	uint8_t *kind;                         /* [2P] enum side_kind */
 	uint32_t *target;                      /* [threads][2P] scratch: a block's runs */
 	double *sum;                           /* [threads][2P] */
+	uint32_t *has;                         /* [threads][chains] the row it was last met in */
 };
 
 static void set_kinds(const struct transport *t, uint8_t *kind)
@@ -335,19 +336,64 @@ static ALWAYS_INLINE struct runs sum_block(const struct pass *p, const struct bl
 	return r;
 }
 
+/* A row in work: which chains it has blocks of. */
+struct row_chains {
+	const uint32_t *has;
+	uint32_t mark;
+};
+
+static struct row_chains mark_row(const struct pass *p, size_t row, int thread)
+{
+	const struct transport *t = p->t;
+	uint32_t *has = p->has + (size_t)thread * t->chains.n;
+
+	for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++)
+		has[t->block[b].chain] = (uint32_t)row + 1;
+	return (struct row_chains){ has, (uint32_t)row + 1 };
+}
+
+/* Whether a row follows what the lobes of a side make of a block's light. */
+static int follows_lobe(const struct transport *t, const struct row_chains *c,
+                        const struct block *block, uint32_t target)
+{
+	const struct chains *all = &t->chains;
+	const uint32_t *slot = all->slot + 4 * model_patch_material(t->m, target >> 1) + 2 * (target & 1);
+
+	for (int way = 0; way < 2; way++) {
+		if (slot[way] == CHAIN_NONE || !all->finite[slot[way]])
+			continue;
+		uint32_t child = ((const uint32_t *)all->child.data)
+			[(size_t)block->chain * all->events + slot[way]];
+		if (child != CHAIN_NONE && c->has[child] == c->mark)
+			return 1;
+	}
+	return 0;
+}
+
+static inline uint8_t run_kind(const struct pass *p, const struct row_chains *c,
+                               const struct block *block, uint32_t target)
+{
+	uint8_t kind = p->kind[target];
+
+	return kind == SIDE_SPECIAL && follows_lobe(p->t, c, block, target) ? SIDE_IDEAL : kind;
+}
+
 static void count_rows(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct pass *p = arg;
 	struct transport *t = p->t;
 
-	for (uint64_t b = t->row_block[begin]; b < t->row_block[end]; b++) {
-		struct runs r = sum_block(p, &t->block[b], thread, 0);
-		uint64_t n[SIDE_KINDS] = { 0 };
-		for (size_t i = 0; i < r.n; i++)
-			n[p->kind[r.target[i]]]++;
-		t->block[b].run = r.n;
-		t->block[b].special = n[SIDE_SPECIAL];
-		t->block[b].ideal = n[SIDE_IDEAL];
+	for (size_t row = begin; row < end; row++) {
+		struct row_chains c = mark_row(p, row, thread);
+		for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
+			struct runs r = sum_block(p, &t->block[b], thread, 0);
+			uint64_t n[SIDE_KINDS] = { 0 };
+			for (size_t i = 0; i < r.n; i++)
+				n[run_kind(p, &c, &t->block[b], r.target[i])]++;
+			t->block[b].run = r.n;
+			t->block[b].special = n[SIDE_SPECIAL];
+			t->block[b].ideal = n[SIDE_IDEAL];
+		}
 	}
 }
 
@@ -366,7 +412,8 @@ static void number_runs(struct transport *t)
 	}
 }
 
-static void fill_block(const struct pass *p, struct block *block, uint32_t source, int thread)
+static void fill_block(const struct pass *p, const struct row_chains *c, struct block *block,
+                       uint32_t source, int thread)
 {
 	struct transport *t = p->t;
 	struct runs r = sum_block(p, block, thread, 1);
@@ -374,14 +421,16 @@ static void fill_block(const struct pass *p, struct block *block, uint32_t sourc
 
 	block->sum = block->escape + block->black + block->lost + block->cut;
 	for (size_t i = 0; i < r.n; i++) {
-		uint8_t kind = p->kind[r.target[i]];
+		uint8_t kind = run_kind(p, c, block, r.target[i]);
 		uint64_t at = to[kind]++;
 		t->run_target[at] = r.target[i];
 		t->run_sum[at] = r.sum[i];
 		block->sum += r.sum[i];
 		if (kind != SIDE_PLAIN)
 			t->run_link[block->link + (at - block->special)] =
-				find_link(t, p->link, block, r.target[i], source);
+				follows_lobe(t, c, block, r.target[i])
+					? RUN_FOLLOWED
+					: find_link(t, p->link, block, r.target[i], source);
 	}
 }
 
@@ -390,9 +439,11 @@ static void fill_rows(void *arg, size_t begin, size_t end, int thread)
 	const struct pass *p = arg;
 	struct transport *t = p->t;
 
-	for (size_t r = begin; r < end; r++)
+	for (size_t r = begin; r < end; r++) {
+		struct row_chains c = mark_row(p, r, thread);
 		for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
-			fill_block(p, &t->block[b], t->row_side[r], thread);
+			fill_block(p, &c, &t->block[b], t->row_side[r], thread);
+	}
 }
 
 static int make_runs(struct transport *t, const struct link_key *link, int threads,
@@ -401,9 +452,11 @@ static int make_runs(struct transport *t, const struct link_key *link, int threa
 	size_t sides = 2 * t->m->patches, scratch = sides * (size_t)(threads > 1 ? threads : 1);
 	struct pass p = { t, link, mem_new(sides, 1, what, e),
 	                  mem_new(scratch, sizeof *p.target, what, e),
-	                  mem_new(scratch, sizeof *p.sum, what, e) };
+	                  mem_new(scratch, sizeof *p.sum, what, e),
+	                  mem_new(t->chains.n * (size_t)(threads > 1 ? threads : 1), sizeof *p.has,
+	                          what, e) };
 
-	if (p.kind && p.target && p.sum) {
+	if (p.kind && p.target && p.sum && p.has) {
 		set_kinds(t, p.kind);
 		par_for(t->rows, 64, threads, count_rows, &p, NULL);
 		number_runs(t);
@@ -412,11 +465,14 @@ static int make_runs(struct transport *t, const struct link_key *link, int threa
 		t->run_link = mem_new(t->special_runs, sizeof *t->run_link, what, e);
 	}
 	int bad = !t->run_target || !t->run_sum || !t->run_link;
+	if (p.has)
+		memset(p.has, 0, t->chains.n * (size_t)(threads > 1 ? threads : 1) * sizeof *p.has);
 	if (!bad)
 		par_for(t->rows, 64, threads, fill_rows, &p, NULL);
 	free(p.kind);
 	free(p.target);
 	free(p.sum);
+	free(p.has);
 	return bad ? -1 : 0;
 }
 
@@ -457,7 +513,7 @@ int transport_init(struct transport *t, const struct model *m, const struct ff *
 	if (check_parts(f, names, n, e))
 		return -1;
 	qsort(f, n, sizeof *f, by_part);
-	if (chains_init(&t->chains, m, e) || size_arrays(t, e))
+	if (chains_init(&t->chains, m, f[0]->chain_most, e) || size_arrays(t, e))
 		return -1;
 	return join(t, threads, e);
 }

@@ -11,7 +11,7 @@
 enum side_kind {
 	SIDE_PLAIN,          /* absorbs and reflects diffusely, no more */
 	SIDE_SPECIAL,        /* lets light through diffusely or has a finite lobe */
-	SIDE_IDEAL,          /* sends light on by an ideal event, too */
+	SIDE_IDEAL,          /* sends light on by an event that the row follows, too */
 	SIDE_KINDS
 };
 
@@ -23,15 +23,17 @@ struct block {
 	uint64_t local;      /* its number in the shard */
 	uint64_t run;        /* first; ends where the next block's begins */
 	uint64_t special;    /* first run on a special side */
-	uint64_t ideal;      /* first run on an ideal one */
+	uint64_t ideal;      /* first run that the row follows on */
 	uint64_t link;       /* run_link of the first special run */
 	double sum;          /* runs + the rest below: what comes in by this chain */
 	double escape, black, lost, cut;
 };
 
 /* A run_link: the link, with the bit set if it is the nearest in direction and not the
- * source's, or FF_NO_ROW on a side without. */
+ * source's, FF_NO_ROW on a side without, or RUN_FOLLOWED where the row itself says what
+ * lobes make of the light. */
 #define RUN_GUESSED 0x80000000u
+#define RUN_FOLLOWED (FF_NO_ROW - 1)
 
 struct transport {
 	const struct model *m;

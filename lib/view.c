@@ -38,6 +38,7 @@ struct render {
 	struct planes at;
 	double (*spot)[2];          /* [samples] positions in the pixel */
 	struct worker *worker;      /* [threads] */
+	struct gather *gather;
 	struct tile_sum *tile;
 	size_t across;              /* tiles in a row */
 };
@@ -199,6 +200,21 @@ static double store_pixel(const struct render *r, const struct view_sums *from, 
 	return sum;
 }
 
+/* Tells what light is needed for a tile. */
+static void ask_tiles(void *arg, size_t begin, size_t end, int thread)
+{
+	const struct render *r = arg;
+	struct worker *k = &r->worker[thread];
+
+	for (size_t tile = begin; tile < end; tile++) {
+		struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack, .shader = &k->shader };
+		int i0 = (int)(tile % r->across) * TILE, j0 = (int)(tile / r->across) * TILE;
+		for (int j = j0; j < j0 + TILE && j < r->f->height; j++)
+			for (int i = i0; i < i0 + TILE && i < r->f->width; i++)
+				follow_pixel(r, &w, i, j);
+	}
+}
+
 static void trace_tile(const struct render *r, struct worker *k, size_t tile)
 {
 	struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack,
@@ -241,7 +257,7 @@ static double radical_inverse(uint32_t i)
 	return x;
 }
 
-static int new_worker(const struct render *r, struct worker *k, struct err *e)
+static int new_worker(const struct render *r, struct worker *k, int thread, struct err *e)
 {
 	size_t values = TILE * TILE * (size_t)r->v->m->bands;
 	struct view_sums *s = &k->sums;
@@ -253,7 +269,7 @@ static int new_worker(const struct render *r, struct worker *k, struct err *e)
 	s->directional = s->diffuse + values;
 	s->emission = s->directional + values;
 	s->square = s->emission + values;
-	return r->v->method == VIEW_MESH ? 0 : view_shader_init(&k->shader, r->v, e);
+	return r->v->method == VIEW_MESH ? 0 : view_shader_init(&k->shader, r->v, r->gather, thread, e);
 }
 
 static void free_workers(struct render *r)
@@ -266,6 +282,26 @@ static void free_workers(struct render *r)
 	free(r->worker);
 }
 
+static int new_gather(struct render *r, struct err *e)
+{
+	struct gather_options o = { .rays = r->o->gather_rays, .depth = r->o->depth,
+		                    .threads = r->o->threads };
+
+	r->gather = r->v->method == VIEW_GATHER ? gather_new(r->v, &o, e) : NULL;
+	return r->gather || r->v->method != VIEW_GATHER ? 0 : -1;
+}
+
+/* Gathers light at the corners of elements that are seen. */
+static void gather(struct render *r, size_t tiles, const struct progress *progress)
+{
+	for (int t = 0; t < r->o->threads; t++)
+		r->worker[t].shader.asking = 1;
+	par_for(tiles, 1, r->o->threads, ask_tiles, r, NULL);
+	for (int t = 0; t < r->o->threads; t++)
+		r->worker[t].shader.asking = 0;
+	gather_corners(r->gather, progress);
+}
+
 static int new_buffers(struct render *r, size_t tiles, struct err *e)
 {
 	int n = r->o->samples;
@@ -276,7 +312,7 @@ static int new_buffers(struct render *r, size_t tiles, struct err *e)
 	if (!r->tile || !r->spot || !r->worker)
 		return -1;
 	for (int t = 0; t < r->o->threads; t++)
-		if (new_worker(r, &r->worker[t], e))
+		if (new_worker(r, &r->worker[t], t, e))
 			return -1;
 	/* Hammersley points, the same in every pixel: edges come out regular. */
 	for (int i = 0; i < n; i++) {
@@ -317,12 +353,17 @@ int view_render(const struct view_scene *v, const struct view_frame *f,
 	r.across = ((size_t)f->width + TILE - 1) / TILE;
 	tiles = r.across * down;
 	*picture = (struct image){ 0 };
-	if (!new_buffers(&r, tiles, e) && !new_picture(&r, picture, e)) {
+	if (!new_gather(&r, e) && !new_buffers(&r, tiles, e) && !new_picture(&r, picture, e)) {
+		if (r.gather)
+			gather(&r, tiles, progress);
 		par_for(tiles, 1, o->threads, trace_tiles, &r, progress);
 		sum_tiles(&r, tiles, stats);
 		bad = failed(&r, e);
 	}
+	if (r.gather && !bad)
+		stats->rays += gather_rays(r.gather);
 	free_workers(&r);
+	gather_free(r.gather);
 	free(r.spot);
 	free(r.tile);
 	return bad;

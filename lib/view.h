@@ -27,8 +27,9 @@ enum {
 };
 
 /* Where diffuse light comes from: all of it interpolated between the elements; that from
- * emitters, straight, computed for each point. */
-enum view_method { VIEW_MESH, VIEW_DIRECT };
+ * emitters, straight, computed for each point; that, and indirect light gathered against the
+ * solution. */
+enum view_method { VIEW_MESH, VIEW_DIRECT, VIEW_GATHER };
 
 struct view_options {
 	int samples;       /* a pixel; 1 = its centre, else stratified over it */
@@ -37,6 +38,7 @@ struct view_options {
 	int depth;         /* directional events followed */
 	double cutoff;     /* tails of less than this part of a pixel are cut */
 	unsigned layers;   /* VIEW_... */
+	int gather_rays;   /* that indirect light is gathered by at a point */
 	int threads;
 };
 
@@ -50,7 +52,7 @@ struct view_stats {
 struct view_scene;
 
 /* What all views share: tables of materials, interpolated irradiance, the brightest
- * radiance, emitters. m and rays must outlive it. NULL and e on failure. O(elements). */
+ * radiance, emitters. m, s and rays must outlive it. NULL and e on failure. O(elements). */
 struct view_scene *view_scene_new(const struct model *m, const struct solution *s,
                                   const struct ray_scene *rays, enum view_method method,
                                   int threads, struct err *e);

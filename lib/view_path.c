@@ -125,7 +125,7 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b, str
 		for (size_t i = 0; i < bands; i++)
 			diffuse[i] += b->weight[i] * s->across[i] * h[i];
 	}
-	if (!s->emits)
+	if (!s->emits || w->unlit)
 		return;
 	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] };
 	bsdf_emission(w->v->m, p->material, p->n, out, h);
@@ -248,7 +248,7 @@ void view_follow(struct view_walker *w, struct view_branch *b)
 	for (int i = 0; i < w->v->m->bands; i++)
 		b->weight[i] = 1;
 	b->depth = b->lobes = 0;
-	b->passes = 1;
+	b->passes = !w->unlit;
 	b->share = 1;
 	follow_branch(w, b);
 	while (w->waiting) {

@@ -24,6 +24,7 @@ struct view_side {
 
 struct view_scene {
 	const struct model *m;
+	const struct solution *s;
 	const struct ray_scene *rays;
 	enum view_method method;
 	struct reconstruction all;  /* irradiance by all paths; empty where it is not needed */
@@ -63,6 +64,8 @@ struct view_walker {
 	const struct view_options *o;
 	struct view_shader *shader; /* for points whose light is to be computed; NULL: none is */
 	uint32_t pixel;             /* that it is told with them */
+	int unlit;                  /* emitters are black, and so are all backs of one-sided
+	                               materials: what gathering finds */
 	struct view_branch *stack;
 	size_t waiting;
 	double diffuse[BANDS_MAX], directional[BANDS_MAX], emission[BANDS_MAX];

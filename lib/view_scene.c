@@ -88,9 +88,9 @@ static int tabulate(struct view_scene *v, struct err *e)
 /* All light is interpolated where it is not recomputed, and behind what blurs it. */
 static int interpolate(struct view_scene *v, const struct solution *s, int threads, struct err *e)
 {
-	static const unsigned kept[] = { PART_ALL, PART_CAUSTIC | PART_INDIRECT };
+	static const unsigned kept[] = { PART_ALL, PART_CAUSTIC | PART_INDIRECT, PART_CAUSTIC };
 
-	if ((v->method == VIEW_MESH || v->tails) &&
+	if ((v->method != VIEW_DIRECT || v->tails) &&
 	    reconstruct(v->m, s, PART_ALL, threads, &v->all, e))
 		return -1;
 	return v->method != VIEW_MESH &&
@@ -106,6 +106,7 @@ struct view_scene *view_scene_new(const struct model *m, const struct solution *
 	if (!v)
 		return NULL;
 	v->m = m;
+	v->s = s;
 	v->rays = rays;
 	v->method = method;
 	if (!tabulate(v, e) && !interpolate(v, s, threads, e) &&

@@ -3,9 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-int view_shader_init(struct view_shader *s, const struct view_scene *v, struct err *e)
+int view_shader_init(struct view_shader *s, const struct view_scene *v, struct gather *gather,
+                     int thread, struct err *e)
 {
-	*s = (struct view_shader){ .v = v, .relative = 1e-2 };
+	*s = (struct view_shader){ .v = v, .relative = 1e-2, .gather = gather, .thread = thread };
 	s->direct = direct_worker_new(v->direct, e);
 	return s->direct ? 0 : -1;
 }
@@ -30,6 +31,11 @@ void view_shader_put(struct view_shader *s, const struct view_request *q, const 
 {
 	const struct view_side *side = &s->v->side[2 * q->material + (uint32_t)q->side];
 
+	for (int k = 0; k < 2 && s->asking; k++)
+		if (k == q->side ? side->diffuse : side->translucent)
+			gather_want(s->gather, 2 * q->element + (uint32_t)k);
+	if (s->asking)
+		return;
 	if (vec_append(&s->request, q, 1, sizeof *q, &s->e) ||
 	    vec_append(&s->weight, weight, (size_t)s->v->m->bands, sizeof *weight, &s->e))
 		return;
@@ -61,6 +67,14 @@ static void shade(struct view_shader *s, size_t request, int side, const struct 
 	direct_begin(s->direct, 2 * q->element + (uint32_t)side);
 	if (direct_at(s->direct, q->x, q->seed, s->relative, h, error, &s->e))
 		return;
+	for (size_t b = 0; b < bands; b++) {
+		double off = weight[b] * part[b] * error[b];
+		light[b] += weight[b] * part[b] * h[b];
+		square[b] += off * off;
+	}
+	if (!s->gather)
+		return;
+	gather_at(s->gather, 2 * q->element + (uint32_t)side, q->x, q->w, q->seed, s->thread, h, error);
 	for (size_t b = 0; b < bands; b++) {
 		double off = weight[b] * part[b] * error[b];
 		light[b] += weight[b] * part[b] * h[b];

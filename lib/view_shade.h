@@ -4,6 +4,7 @@
 #ifndef TWOPASS_VIEW_SHADE_H
 #define TWOPASS_VIEW_SHADE_H
 
+#include "gather.h"
 #include "mem.h"
 #include "view_path.h"
 
@@ -21,6 +22,8 @@ struct view_shader {
 	const struct view_scene *v;
 	double relative;            /* error of sampled light to aim at */
 	struct direct_worker *direct;
+	struct gather *gather;      /* NULL: indirect light is interpolated */
+	int thread, asking;         /* asking: points are told to gather, not shaded */
 	struct vec request;         /* struct view_request */
 	struct vec weight;          /* double [bands] for each */
 	struct vec order;           /* uint64_t: element-side that light arrives on, request */
@@ -28,7 +31,8 @@ struct view_shader {
 };
 
 /* 0, or -1 and e. To be freed in any case. */
-int view_shader_init(struct view_shader *s, const struct view_scene *v, struct err *e);
+int view_shader_init(struct view_shader *s, const struct view_scene *v, struct gather *gather,
+                     int thread, struct err *e);
 void view_shader_free(struct view_shader *s);
 
 void view_shader_put(struct view_shader *s, const struct view_request *q, const double *weight);

@@ -20,7 +20,7 @@
 #include "common/cli.h"
 
 enum { OPT_EYE = 256, OPT_TARGET, OPT_UP, OPT_FOV, OPT_SAMPLES, OPT_LOBE_SAMPLES, OPT_DEPTH,
-       OPT_CUTOFF, OPT_HALF, OPT_COMPRESSION, OPT_LAYERS, OPT_MIX };
+       OPT_CUTOFF, OPT_HALF, OPT_COMPRESSION, OPT_LAYERS, OPT_MIX, OPT_GATHER_RAYS };
 
 static const struct cli_option option_table[] = {
 	{ 'c', "camera", "NAME", "camera to render; repeatable, or 'all'" },
@@ -30,10 +30,11 @@ static const struct cli_option option_table[] = {
 	{ OPT_TARGET, "target", "X,Y,Z", "point it looks at" },
 	{ OPT_UP, "up", "X,Y,Z", "its upright direction (default: 0,1,0)" },
 	{ OPT_FOV, "fov", "DEGREES", "its vertical field of view (default: 50)" },
-	{ 'd', "diffuse", "METHOD", "where diffuse light comes from: mesh (default) or direct" },
+	{ 'd', "diffuse", "METHOD", "where diffuse light comes from: mesh (default), direct, gather" },
 	{ OPT_SAMPLES, "samples", "N", "positions in each pixel (default: 4; 1: its centre)" },
 	{ OPT_LOBE_SAMPLES, "lobe-samples", "N",
 	  "rays into a finite lobe (default: 0: one, about its axis)" },
+	{ OPT_GATHER_RAYS, "gather-rays", "N", "rays that -d gather takes at a point (default: 1024)" },
 	{ OPT_DEPTH, "depth", "N", "directional events that are followed (default: 32)" },
 	{ OPT_CUTOFF, "cutoff", "X", "cut tails that carry less than this part (default: 0.001)" },
 	{ OPT_LAYERS, "layers", "LIST",
@@ -97,14 +98,14 @@ static int vector(const struct cli *c, const char *option, const char *text, dou
 
 static void diffuse_method(struct trace *t, const char *text)
 {
-	static const char *const name[] = { "mesh", "direct" };
+	static const char *const name[] = { "mesh", "direct", "gather" };
 
-	for (int i = 0; i < 2; i++)
+	for (int i = 0; i < 3; i++)
 		if (strcmp(text, name[i]) == 0) {
 			t->method = (enum view_method)i;
 			return;
 		}
-	cli_usage(&t->cli, "--diffuse: there is no method '%s'; use mesh or direct", text);
+	cli_usage(&t->cli, "--diffuse: there is no method '%s'; use mesh, direct or gather", text);
 }
 
 static void compression(struct trace *t, const char *text)
@@ -145,6 +146,9 @@ static void take_option(struct trace *t, int letter)
 		break;
 	case OPT_LOBE_SAMPLES:
 		t->view.lobe_samples = (int)cli_integer(c, "--lobe-samples", optarg, 0, 1 << 16);
+		break;
+	case OPT_GATHER_RAYS:
+		t->view.gather_rays = (int)cli_integer(c, "--gather-rays", optarg, 4, 1 << 20);
 		break;
 	case OPT_DEPTH:
 		t->view.depth = (int)cli_integer(c, "--depth", optarg, 0, 100000);
@@ -225,7 +229,7 @@ static void picture_key(const struct trace *t, struct shot *s)
 {
 	const struct view_options *v = &t->view;
 	const double number[] = { s->frame.width, s->frame.height, v->samples, v->lobe_samples,
-		v->depth, v->cutoff, v->layers, t->method, t->exr.compression, t->exr.half };
+		v->depth, v->cutoff, v->layers, t->method, v->gather_rays, t->exr.compression, t->exr.half };
 	char camera[33];
 	struct digest *d = digest_new();
 
@@ -444,7 +448,7 @@ int main(int argc, char **argv)
 		.cli = { .program = "trace", .synopsis = "[options] FILE.rad -o PICTURE.exr",
 		         .about = "Render views of a solved scene, following mirrors and panes.",
 		         .options = option_table, .uses_threads = 1 },
-		.view = { .samples = 4, .depth = 32, .cutoff = 1e-3 }
+		.view = { .samples = 4, .depth = 32, .cutoff = 1e-3, .gather_rays = 1024 }
 	};
 	struct err e = { 0 };
 	int status = 0;

@@ -93,6 +93,7 @@ static inline void memory_ff(const struct model *m, const struct ff_options *o, 
 	assert_int_equal(bad, 0);
 	f->chains = head.chains;
 	f->chain_events = head.chain_events;
+	f->chain_most = head.chain_most;
 	f->chain_start = head.chain_start;
 	f->chain_event = head.chain_event;
 	f->chain_count = head.chain_count;

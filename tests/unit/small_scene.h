@@ -131,7 +131,7 @@ static inline void small_ff(struct ff *f)
 	const double escape[] = { .375, 0, 1, .5, 0 }, black[] = { .125, .125, 0, .125, 0 };
 	const uint32_t target[] = { 0 }, source[] = { 2 }, chain[] = { 0 }, rows[] = { 3, FF_NO_ROW };
 
-	*f = (struct ff){ .chains = 2, .chain_events = 1, .rows = 4, .blocks = 5, .entries = 7,
+	*f = (struct ff){ .chains = 2, .chain_most = 64, .chain_events = 1, .rows = 4, .blocks = 5, .entries = 7,
 		.arrivals = 1, .links = 1, .patch_end = 2, .part = 1, .parts = 1,
 		.chain_start = COPY(chain_start), .chain_event = COPY(chain_event),
 		.chain_count = COPY(chain_count), .row_side = COPY(row_side),

@@ -109,7 +109,7 @@ static void exchange(double f01, double f10, double error, struct verify *v)
 	uint64_t row_block[] = { 0, 1, 2 }, block_start[] = { 0, 1, 2 }, arrival[] = { 0, 0, 0 };
 	uint64_t chain_start[] = { 0, 0 };
 	uint8_t kind[] = { FF_DIFFUSE, FF_DIFFUSE }, front[] = { 1, 1 };
-	const struct ff f = { .chains = 1, .chain_start = chain_start, .rows = 2, .row_side = side,
+	const struct ff f = { .chains = 1, .chain_most = 2, .chain_start = chain_start, .rows = 2, .row_side = side,
 		.row_kind = kind, .row_samples = samples, .row_scale = scale, .row_residual = nought,
 		.row_error = errors, .row_block = row_block, .blocks = 2, .block_chain = chain,
 		.block_start = block_start, .block_escape = escape, .block_black = zero,
@@ -200,7 +200,7 @@ static void spans(uint32_t first0, uint32_t count0, uint32_t first1, uint32_t co
 	float value[8] = { .125f, .125f, .125f, .125f, .125f, .125f, .125f, .125f }, nought[] = { 0 };
 	uint64_t row_block[] = { 0, 1 }, entries[] = { 0, 8 }, words[] = { 1 }, none[] = { 0, 0 };
 	uint8_t kind[] = { FF_DIFFUSE }, sides2[] = { 3 };
-	const struct ff f = { .chains = 1, .chain_start = none, .rows = 1, .row_side = side,
+	const struct ff f = { .chains = 1, .chain_most = 2, .chain_start = none, .rows = 1, .row_side = side,
 		.row_kind = kind, .row_samples = samples, .row_scale = one, .row_residual = nought,
 		.row_error = nought, .row_block = row_block, .blocks = 1, .block_chain = chain,
 		.block_start = entries, .block_column = words, .block_escape = zero,

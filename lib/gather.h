@@ -1,0 +1,50 @@
+/* Final gathering: indirect irradiance at points, from rays over their hemisphere against
+ * the solution.
+ *
+ * What a ray meets adds the radiance of its diffuse light, interpolated; where it meets a
+ * surface that reflects or transmits directionally it goes on, but an emitter is never
+ * counted: light that comes straight from emitters is direct, light by directional events
+ * alone caustic, and both are known by other ways.
+ *
+ * Irradiance that varies smoothly is gathered at the corners of elements and interpolated;
+ * where its second differences say that this would be off by more than is wanted it is
+ * gathered at the points themselves. */
+#ifndef TWOPASS_GATHER_H
+#define TWOPASS_GATHER_H
+
+#include <stdint.h>
+
+#include "err.h"
+#include "par.h"
+#include "view_path.h"
+
+struct gather;
+
+struct gather_options {
+	int rays;               /* from a point, if `relative` is 0 */
+	double relative;        /* standard error of a pixel that is aimed at, or 0 */
+	int depth;              /* directional events that a gathering ray may go on after */
+	int threads;
+};
+
+/* v, made for VIEW_GATHER, must outlive it. O(elements). NULL and e on failure. */
+struct gather *gather_new(const struct view_scene *v, const struct gather_options *o,
+                          struct err *e);
+void gather_free(struct gather *g);
+
+/* Asks for the light on a side of an element; from any thread. */
+void gather_want(struct gather *g, uint32_t element_side);
+
+/* Gathers at the corners of all that is wanted. The result depends on what was wanted, but
+ * not on the number of threads. O(corners x rays x log triangles). */
+void gather_corners(struct gather *g, const struct progress *progress);
+
+/* Indirect irradiance into h[bands] and its standard error into error[bands] at point x
+ * (world) of a side that was wanted, whose element's corners have weights w there. */
+void gather_at(struct gather *g, uint32_t element_side, const double x[3], const double w[3],
+               uint64_t seed, int thread, double *h, double *error);
+
+/* Rays traced so far. */
+uint64_t gather_rays(const struct gather *g);
+
+#endif

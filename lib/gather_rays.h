@@ -1,0 +1,50 @@
+/* Rays of one gathering point (private to lib/gather*.c). */
+#ifndef TWOPASS_GATHER_RAYS_H
+#define TWOPASS_GATHER_RAYS_H
+
+#include "locate.h"
+#include "view_path.h"
+
+/* What rays find: the radiance of element-sides as a linear function of the weights of
+ * corners 1 and 2 of their triangles, c0 + c1 w1 + c2 w2. */
+struct gather_table {
+	const struct view_scene *v;
+	struct locator locator;
+	float *radiance;            /* [2 elements][3][bands] */
+	float *rest;                /* [2 elements][3][bands] the same without direct light */
+	struct reconstruction indirect; /* as interpolated */
+	unsigned char *kind;        /* [2 elements] GATHER_... */
+	uint32_t *bits;             /* [2][GATHER_BITS] of Sobol points */
+};
+
+/* Where a ray goes on; where the light straight from emitters varies more than elements
+ * tell: it is computed where rays meet such a side close by. */
+enum { GATHER_TAIL = 1, GATHER_ROUGH = 2 };
+
+/* One thread's. */
+struct gather_worker {
+	const struct gather_table *t;
+	struct view_walker walker;  /* for tails */
+	struct view_options o;
+	struct view_branch *stack;
+	struct direct_worker *direct;
+	struct err e;
+	uint64_t rays;
+};
+
+/* v must outlive it. 0, or -1 and e; to be freed in any case. O(elements). */
+int gather_table_init(struct gather_table *t, const struct view_scene *v, const struct solution *s,
+                      int threads, struct err *e);
+void gather_table_free(struct gather_table *t);
+
+int gather_worker_init(struct gather_worker *w, const struct gather_table *t,
+                       const struct view_scene *v, int depth, struct err *e);
+void gather_worker_free(struct gather_worker *w);
+
+/* Indirect irradiance at a point that has left its surface, whose side has unit normal n:
+ * pi times the mean radiance of `rays` rays by the cosine; with relative > 0 as many as it
+ * takes for a standard error of that times scale[bands]. */
+void gather_point(struct gather_worker *w, const double x[3], const double n[3], uint64_t seed,
+                  int rays, double relative, const double *scale, double *h, double *error);
+
+#endif
