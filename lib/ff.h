@@ -57,8 +57,9 @@ struct ff {
 	size_t rows;
 	uint32_t *row_side;       /* patch-side, or light, that the flux leaves */
 	uint8_t *row_kind;
-	uint32_t *row_samples;    /* rays or hemicube pixels spent on block 0, or as
-	                             many independent rays as gathered values are worth;
+	uint32_t *row_samples;    /* rays or hemicube pixels spent on block 0, or as many
+	                             independent rays as gathered values are worth to the
+	                             irradiance of elements;
 	                             0: all by formula */
 	double *row_scale;
 	float *row_residual;      /* 1 - sum before scaling (raw closure error) */

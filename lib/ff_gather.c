@@ -20,6 +20,15 @@ static const double larger = 2.2, enough = .11;
 /* How far the sum of gathered factors may be from what must land there. */
 static const double misfit = .25;
 
+/* Of the rays of an element, as many as so many independent ones to the irradiance: they are
+ * stratified, and what one patch gets too many of them another lacks. Measured: 1.2 n^.4
+ * within 4 % in a closed room with n from 64 to 1024, for whose standard errors that is
+ * 2.5 to 4.4 times less; the exponent is between those of two and of four dimensions. */
+static double worth(uint32_t rays)
+{
+	return fmax(1, 1.2 * pow(rays, .4));
+}
+
 /* Stated errors beyond which something is sure. */
 static const double certain = 4;
 
@@ -421,6 +430,7 @@ int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_w
 	double sum = ff_row_is_seen(j, ps) ? ff_see(t, ps, wanted, &t->tally.err) : recall(t, ps);
 	struct tale a = add_up(t, sum);
 	double rays, said = landing(t, ps, cast, &rays), lands = settle(said, rays, &a);
+	double per_sample = a.variance / (ff_row_is_seen(j, ps) ? 1 : worth(j->gather.rays));
 
 	if (t->tally.err.set || !(lands > 0 && sum > 0) ||
 	    fabs(sum - said) > misfit * said + 3 * sqrt(fmax(sum, said) / rays))
@@ -430,7 +440,7 @@ int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_w
 	if (!cast)
 		book_lost(t, ps, 1 - lands);
 	put_sights(t, ps, total * lands / sum);
-	double variance = a.variance + (cast ? (1 - lands) / cast : 0);
-	*w = (struct ff_weight){ (uint32_t)fmax(1, fmin(UINT32_MAX, 1 / variance)), total };
+	per_sample += cast ? (1 - lands) / cast : 0;
+	*w = (struct ff_weight){ (uint32_t)fmax(1, fmin(UINT32_MAX, 1 / per_sample)), total };
 	return 1;
 }

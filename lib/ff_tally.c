@@ -6,14 +6,6 @@
 
 #include "vec3.h"
 
-struct tally_far {
-	uint64_t key;      /* slot, patch-side, element in that order */
-	uint32_t column;
-	double w;
-};
-
-enum { FAR_MOST = 1 << 20 }; /* landings kept before equal ones are added up */
-
 struct tally_arrival {
 	uint32_t slot, target;
 	double dir[3];     /* towards the source, weighted */
@@ -75,7 +67,7 @@ int tally_init(struct tally *t, const struct model *m, const struct tally_places
 	size_t sides = 2 * m->elements;
 
 	*t = (struct tally){ .m = m, .places = places, .has_lobe = has_lobe,
-	                     .far_most = FAR_MOST, .words = (sides + 4095) / 4096 };
+	                     .words = (sides + 4095) / 4096 };
 	if (chains_init(&t->chains, m, chain_most, e))
 		return -1;
 	t->count = mem_new(sides, sizeof *t->count, "row tally", e);
@@ -96,72 +88,17 @@ int tally_init(struct tally *t, const struct model *m, const struct tally_places
 void tally_free(struct tally *t)
 {
 	void *array[] = { t->count, t->dense, t->seen, t->words_seen, t->replicate,
-		t->square, t->variance, t->toward, t->far.data, t->sort.data, t->rest.data, t->slot_chain.data,
+		t->square, t->variance, t->toward, t->rest.data, t->slot_chain.data,
 		t->chain_slot.data, t->arrival.data };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
+	tally_far_free(&t->far);
 	chains_free(&t->chains);
 	*t = (struct tally){ 0 };
 }
 
 /* ---- while a row is cast ---- */
-
-/* Least-significant-digit radix sort by key, 11 bits a pass; stable. */
-static int sort_far(struct tally *t, struct err *e)
-{
-	size_t n = t->far.n;
-	uint64_t all = 0;
-
-	t->sort.n = 0;
-	if (vec_reserve(&t->sort, n, sizeof(struct tally_far), e))
-		return -1;
-	struct tally_far *from = t->far.data, *to = t->sort.data;
-	for (size_t i = 0; i < n; i++)
-		all |= from[i].key;
-	for (int shift = 0; shift < 64 && all >> shift; shift += 11) {
-		size_t at[2048] = { 0 }, sum = 0;
-		for (size_t i = 0; i < n; i++)
-			at[from[i].key >> shift & 2047]++;
-		for (int k = 0; k < 2048; k++) {
-			size_t c = at[k];
-			at[k] = sum;
-			sum += c;
-		}
-		for (size_t i = 0; i < n; i++)
-			to[at[from[i].key >> shift & 2047]++] = from[i];
-		struct tally_far *swap = from;
-		from = to;
-		to = swap;
-	}
-	if (from != t->far.data) {
-		struct vec swap = t->far;
-		t->far = t->sort;
-		t->far.n = n;
-		t->sort = swap;
-	}
-	return 0;
-}
-
-/* Sorts and adds up equal places: light that goes round between mirrors lands on the
- * same elements again and again. */
-static int merge_far(struct tally *t, struct err *e)
-{
-	struct tally_far *f;
-	size_t n = 0;
-
-	if (sort_far(t, e))
-		return -1;
-	f = t->far.data;
-	for (size_t i = 0; i < t->far.n; i++) {
-		if (n && f[n - 1].key == f[i].key)
-			f[n - 1].w += f[i].w;
-		else
-			f[n++] = f[i];
-	}
-	t->far.n = n;
-	return 0;
-}
 
 struct tally_rest *tally_rest(struct tally *t, uint32_t chain)
 {
@@ -194,14 +131,10 @@ static void hit_near(struct tally *t, uint32_t place, uint32_t ps, double w)
 static void hit_far(struct tally *t, uint32_t chain, uint32_t place, uint32_t element_side,
                     double w)
 {
-	struct tally_far f = { slot_of(t, chain) * 2 * (uint64_t)t->m->elements + place,
-	                       element_side, w };
+	struct tally_landing l = { slot_of(t, chain) * 2 * (uint64_t)t->m->elements + place,
+	                           element_side, w };
 
-	vec_append(&t->far, &f, 1, sizeof f, &t->err);
-	if (t->far.n >= t->far_most) {
-		merge_far(t, &t->err);
-		t->far_most = t->far.n > FAR_MOST / 2 ? 2 * t->far.n : FAR_MOST;
-	}
+	tally_far_add(&t->far, &l, &t->err);
 }
 
 void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
@@ -442,10 +375,9 @@ static int finish_far(struct tally *t, struct ff_batch *b, struct err *e)
 {
 	size_t slots = t->rest.n, total = 2 * t->m->elements;
 	struct slot_order *order = mem_new(slots, sizeof *order, "row blocks", e);
-	const struct tally_far *f;
-	int bad = !order || merge_far(t, e);
+	int bad = !order || tally_far_merge(&t->far, e);
+	const struct tally_landing *l = t->far.list.data;
 
-	f = t->far.data;
 	for (uint32_t s = 1; !bad && s < slots; s++)
 		order[s] = (struct slot_order){ &t->chains,
 			((const uint32_t *)t->slot_chain.data)[s], s };
@@ -453,17 +385,10 @@ static int finish_far(struct tally *t, struct ff_batch *b, struct err *e)
 		qsort(order + 1, slots - 1, sizeof *order, by_chain);
 	for (size_t k = 1; !bad && k < slots; k++) {
 		uint64_t begin = order[k].slot * (uint64_t)total, end = begin + total;
-		size_t i = 0, hi = t->far.n;
-		while (i < hi) {
-			size_t mid = i + (hi - i) / 2;
-			if (f[mid].key < begin)
-				i = mid + 1;
-			else
-				hi = mid;
-		}
-		for (; !bad && i < t->far.n && f[i].key < end; i++)
+		size_t i = tally_far_find(&t->far, begin);
+		for (; !bad && i < t->far.list.n && l[i].key < end; i++)
 			if (!(bad = batch_reserve(b, 1, e)))
-				batch_put_value(b, f[i].column, f[i].w);
+				batch_put_value(b, l[i].column, l[i].w);
 		bad = bad || put_block(t, b, order[k].slot, e);
 	}
 	free(order);
@@ -476,7 +401,7 @@ static void clear(struct tally *t)
 
 	for (size_t s = 0; s < t->slot_chain.n; s++)
 		((uint32_t *)t->chain_slot.data)[chain[s]] = 0;
-	t->slot_chain.n = t->rest.n = t->far.n = t->arrival.n = 0;
+	t->slot_chain.n = t->rest.n = t->far.list.n = t->arrival.n = 0;
 	t->escape_before = t->escape_square = 0;
 	t->replicates = t->weighed = 0;
 	slot_of(t, 0);

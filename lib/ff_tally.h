@@ -4,6 +4,7 @@
 
 #include "chain.h"
 #include "ff.h"
+#include "ff_tally_far.h"
 #include "mem.h"
 #include "model.h"
 
@@ -43,9 +44,7 @@ struct tally {
 	double escape_before, escape_square;
 	int replicates;
 
-	struct vec far;            /* struct tally_far: longer chains */
-	size_t far_most;           /* when to add up equal ones */
-	struct vec sort;           /* scratch for sorting them */
+	struct tally_far far;      /* longer chains */
 	struct vec rest;           /* struct tally_rest by slot */
 	struct tally_rest spill;   /* takes what comes after running out of memory */
 	struct vec slot_chain;     /* uint32_t chain by slot; slot 0 = chain 0 */

@@ -211,7 +211,7 @@ static enum part part_of(const struct transport *t, uint32_t row, uint32_t chain
 }
 
 /* Variance of an element's irradiance, all groups together, from the sampling of the
- * rows, as if each sample were independent (stratification makes it smaller): a row of n
+ * rows, as if each sample were independent, as row_samples allows for: a row of n
  * samples that sends flux U, of which f lands here, adds U^2 f / n; one without samples,
  * 0. For the four bands with the number of the channels in work. */
 static lanes variance_of(const struct gather *g, uint32_t row, uint64_t b)

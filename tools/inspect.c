@@ -9,16 +9,15 @@
 #include <unistd.h>
 
 #include "../formats/array_stats.h"
-#include "../formats/atomic_file.h"
 #include "../formats/ff_file.h"
 #include "../formats/mesh_file.h"
 #include "../formats/npy_file.h"
 #include "../formats/rad_file.h"
 #include "../lib/mem.h"
-#include "../lib/patch_matrix.h"
 #include "../lib/side_table.h"
 #include "../lib/verify.h"
 #include "common/cli.h"
+#include "common/print_ff.h"
 
 enum { SHOWN = 60 };
 
@@ -294,19 +293,6 @@ static int verify(const struct request *r, struct content *x, struct err *e)
 
 /* ---- CSV ---- */
 
-/* A field as RFC 4180 has it, with what follows it. */
-static void csv_text(const char *text, const char *after)
-{
-	if (!text[strcspn(text, ",\"\n\r")]) {
-		printf("%s%s", text, after);
-		return;
-	}
-	putchar('"');
-	for (; *text; text++)
-		printf(*text == '"' ? "\"%c" : "%c", *text);
-	printf("\"%s", after);
-}
-
 static void csv_header(const struct model *m, int solved)
 {
 	printf("element,side,patch,name,material,area,cx,cy,cz,nx,ny,nz");
@@ -323,8 +309,8 @@ static void csv_line(const struct content *x, size_t element_side, int solved)
 
 	side_row(m, solved ? &x->solution : NULL, element_side, &row);
 	printf("%" PRIu32 ",%c,%" PRIu32 ",", row.element, "fb"[row.side], row.patch);
-	csv_text(m->surface.name[row.surface], ",");
-	csv_text(m->material.name[row.material], "");
+	print_csv(m->surface.name[row.surface], ",");
+	print_csv(m->material.name[row.material], "");
 	printf(",%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g", row.area, row.centre[0],
 	       row.centre[1], row.centre[2], row.normal[0], row.normal[1], row.normal[2]);
 	const double *quantity[] = { row.h, row.m, row.e };
@@ -362,141 +348,21 @@ static int print_sides(const struct request *r, struct content *x, struct err *e
 
 /* ---- form factors ---- */
 
-static void print_matrix_line(double *row, const struct patch_matrix *pm, double black,
-                              double escape)
-{
-	for (size_t k = 0; k < pm->sides; k++)
-		printf(",%.17g", row[k]);
-	if (pm->unmodelled)
-		printf(",%.17g", black);
-	printf(",%.17g\n", escape);
-}
-
-/* Sides without a row (black ones, other parts) have a column but no line. */
-static int csv_matrix(const struct ff_file *ff, const struct patch_matrix *pm, struct err *e)
-{
-	char **name = ff_file_side_names(ff, e);
-	double black, escape, *row = mem_new(pm->sides, sizeof *row, "a row", e);
-	int failed = !name || !row;
-
-	printf("%s", failed ? "" : "from,");
-	for (size_t k = 0; k < pm->sides && !failed; k++)
-		csv_text(name[pm->side[k]], ",");
-	if (!failed)
-		printf("%sescape\n", pm->unmodelled ? "unmodelled," : "");
-	for (size_t i = 0; i < pm->sides && !failed; i++) {
-		if (pm->row[i] == FF_NO_ROW)
-			continue;
-		patch_matrix_row(pm, i, row, &black, &escape);
-		csv_text(name[pm->side[i]], "");
-		print_matrix_line(row, pm, black, escape);
-	}
-	free(row);
-	cache_names_free(name, 2 * ff->scene.patches);
-	return failed ? -1 : 0;
-}
-
-/* The columns of the CSV and a row for each of them, NaN where it has no line. */
-static int npy_matrix(const struct patch_matrix *pm, const char *path, struct err *e)
-{
-	const size_t columns = pm->sides + 1 + (size_t)pm->unmodelled;
-	const uint64_t shape[] = { pm->sides, columns };
-	struct atomic_file *f = atomic_file_create(path, e);
-	double black, *row = mem_new(columns, sizeof *row, "a row", e);
-	int failed = !f || !row || npy_begin(f, DT_F64, 2, shape, e);
-
-	for (size_t i = 0; i < pm->sides && !failed; i++) {
-		patch_matrix_row(pm, i, row, &black, &row[columns - 1]);
-		if (pm->unmodelled)
-			row[columns - 2] = black;
-		failed = atomic_file_write(f, row, columns * sizeof *row, e);
-	}
-	free(row);
-	if (!failed)
-		return atomic_file_finish(f, e);
-	atomic_file_abandon(f);
-	return -1;
-}
-
 static int patch_matrix(const struct request *r, struct content *x, struct err *e)
 {
-	struct patch_matrix pm = { 0 };
-
-	if (need_kind(r, x, "--" PATCH_MATRIX, 1, e) || read_content(r, x, e) ||
-	    patch_matrix_init(&pm, &x->ff.f, &x->ff.scene, e))
+	if (need_kind(r, x, "--" PATCH_MATRIX, 1, e) || read_content(r, x, e))
 		return -1;
-	int failed = r->npy ? npy_matrix(&pm, r->output ? r->output : "-", e)
-	                    : csv_matrix(&x->ff, &pm, e);
-	patch_matrix_free(&pm);
-	return failed;
-}
-
-/* A block's entries; a file to patches has no elements to name. */
-static void print_entries(const struct ff_file *ff, char *const *name, uint32_t row, uint64_t b)
-{
-	const struct ff *f = &ff->f;
-	const uint32_t *start = ff->scene.patch_start;
-	uint32_t patch = 0;
-	struct ff_span s;
-
-	for (struct ff_cursor c = ff_begin(f, b); ff_next(&c, &s);)
-		for (uint32_t k = 0; k < s.count; k++) {
-			uint32_t column = s.column + 2 * k, receiver = column >> 1;
-			if (!f->to_patches && receiver < start[patch])
-				patch = 0; /* the back's entries of a patch follow the front's */
-			while (!f->to_patches && receiver >= start[patch + 1])
-				patch++;
-			printf("%" PRIu32 ",", f->block_chain[b]);
-			csv_text(name[f->to_patches ? column : 2 * patch + (column & 1)], ",");
-			if (!f->to_patches)
-				printf("%" PRIu32, receiver);
-			printf(",%.17g\n", f->row_scale[row] * ff_value(f, s.entry + k));
-		}
-}
-
-static void print_block_lines(const struct ff_file *ff, char *const *name, uint32_t row,
-                              uint64_t b)
-{
-	const struct ff *f = &ff->f;
-	const struct {
-		const char *where;
-		double value;
-	} rest[] = { { "escape", f->block_escape[b] }, { "black", f->block_black[b] },
-	             { "lost", f->block_lost[b] }, { "cut", f->block_cut[b] } };
-
-	print_entries(ff, name, row, b);
-	for (size_t i = 0; i < sizeof rest / sizeof *rest; i++)
-		if (rest[i].value > 0)
-			printf("%" PRIu32 ",%s,,%.17g\n", f->block_chain[b], rest[i].where,
-			       f->row_scale[row] * rest[i].value);
+	return print_patch_matrix(&x->ff, r->npy && !r->output ? "-" : r->output, e);
 }
 
 static int print_row(const struct request *r, struct content *x, struct err *e)
 {
-	static const char *const kind[] = { "diffuse", "emission", "reflected", "transmitted",
-	                                   "light" };
-	const struct ff *f = &x->ff.f;
-	const uint32_t row = (uint32_t)r->row;
-
 	if (read_content(r, x, e))
 		return -1;
-	if (row >= f->rows)
-		return err_set(e, "%s: there is no row %" PRIu32 "; the file has %zu", r->file, row,
-		               f->rows);
-	char **name = ff_file_side_names(&x->ff, e);
-	if (!name)
-		return -1;
-	printf("row       %" PRIu32 "\nfrom      %s\nkind      %s\nsamples   %" PRIu32
-	       "\nscale     %.17g\nresidual  %.17g\nerror     %.17g\n\n", row,
-	       f->row_kind[row] == FF_LIGHT
-	           ? x->ff.light_name[f->row_side[row] - 2 * x->ff.scene.patches]
-	           : name[f->row_side[row]], kind[f->row_kind[row]], f->row_samples[row],
-	       f->row_scale[row], (double)f->row_residual[row], (double)f->row_error[row]);
-	printf("chain,to,element,value\n");
-	for (uint64_t b = f->row_block[row]; b < f->row_block[row + 1]; b++)
-		print_block_lines(&x->ff, name, row, b);
-	cache_names_free(name, 2 * x->ff.scene.patches);
-	return 0;
+	if ((size_t)r->row >= x->ff.f.rows)
+		return err_set(e, "%s: there is no row %ld; the file has %zu", r->file, r->row,
+		               x->ff.f.rows);
+	return print_ff_row(&x->ff, (uint32_t)r->row, e);
 }
 
 /* ---- */
