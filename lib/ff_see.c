@@ -114,7 +114,7 @@ static struct ff_sight by_rays(struct ff_thread *t, uint32_t source, uint32_t co
 	for (int d = 0; d < FF_DIMS; d++)
 		seeds[d] = rng_sobol_seed(seed, d);
 	for (uint32_t first = 0; first < FF_CLOSE_RAYS; first += RAY_BATCH) {
-		ff_batch_from_element(j, &j->of_rows[0], seeds, column, first, RAY_BATCH, &b);
+		ff_batch_from_element(j, &j->of_rows, seeds, column, first, RAY_BATCH, &b);
 		for (int i = 0; i < RAY_BATCH; i++)
 			hits += b.ray.triangle[i] != RAY_MISS && b.ray.side[i] == (source & 1) &&
 			        j->m->element_patch[b.hit[i]] == source >> 1;
