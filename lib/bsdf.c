@@ -156,6 +156,21 @@ void bsdf_eval(const struct model *m, size_t material, const double n[3],
 	evaluate(m, &p, n, wi, wo, BSDF_FROM_LIGHT, f, &pdf);
 }
 
+void bsdf_eval_lobes(const struct model *m, size_t material, const double n[3],
+                     const double wi[3], const double wo[3], double *f)
+{
+	struct parts p;
+	double pdf;
+	int lobes = 0;
+
+	gather_parts(m, material, n, wi, BSDF_FROM_LIGHT, &p);
+	for (int i = 0; i < p.n; i++)
+		if (p.part[i].event == BSDF_LOBE_R || p.part[i].event == BSDF_LOBE_T)
+			p.part[lobes++] = p.part[i];
+	p.n = lobes;
+	evaluate(m, &p, n, wi, wo, BSDF_FROM_LIGHT, f, &pdf);
+}
+
 double bsdf_pdf(const struct model *m, size_t material, const double n[3],
                 const double known[3], enum bsdf_transport transport, const double w[3])
 {

@@ -37,6 +37,10 @@ struct bsdf_sample {
 void bsdf_eval(const struct model *m, size_t material, const double n[3],
                const double wi[3], const double wo[3], double *f);
 
+/* The same of the finite lobes alone. */
+void bsdf_eval_lobes(const struct model *m, size_t material, const double n[3],
+                     const double wi[3], const double wo[3], double *f);
+
 /* Samples the unknown direction given the known one. u: three uniforms in
  * [0,1), u[0] chooses the event. event BSDF_ABSORBED means the path ends (also
  * when nothing scatters, or a reciprocal lobe's sample fell below the horizon).

@@ -8,6 +8,7 @@
 #include "cubature.h"
 #include "emitters.h"
 #include "facet_set.h"
+#include "light.h"
 #include "rng.h"
 #include "seen.h"
 #include "vec3.h"
@@ -371,6 +372,28 @@ static void sample(struct direct_worker *w, const double x[3], size_t n, uint64_
 	}
 }
 
+/* ---- punctual lights ---- */
+
+static void add_lights(struct direct_worker *w, const double world[3], double *h)
+{
+	const struct model *m = w->d->m;
+	double from[3] = { world[0], world[1], world[2] };
+
+	ray_leave(w->d->rays, w->normal, from);
+	for (size_t i = 0; i < m->light.n; i++) {
+		struct light_sight s;
+		light_see(&m->light, i, world, ray_offset(w->d->rays), &s);
+		double scale = v3_dot(w->normal, s.toward) * s.across * s.falloff;
+		if (!(scale > 0))
+			continue;
+		w->rays++;
+		if (ray_blocked(w->d->rays, from, s.to))
+			continue;
+		for (int b = 0; b < m->bands; b++)
+			h[b] += scale * m->light.intensity[i * (size_t)m->bands + (size_t)b];
+	}
+}
+
 int direct_at(struct direct_worker *w, const double world[3], uint64_t seed, double relative,
               double *h, double *error, struct err *e)
 {
@@ -398,5 +421,6 @@ int direct_at(struct direct_worker *w, const double world[3], uint64_t seed, dou
 		for (int b = 0; b < d->m->bands; b++)
 			h[b] += f * w->outlook[i].emitter->radiance[b];
 	}
+	add_lights(w, world, h);
 	return 0;
 }

@@ -1,9 +1,10 @@
-/* Irradiance that comes straight from emitters, at points where a picture needs it.
+/* Irradiance that comes straight from emitters and punctual lights, at points where a picture needs it.
  *
  * What a point sees of an emitter's polygon past the convex bodies between is found by
  * clipping, and its irradiance by Lambert's formula: exact, without noise. Emitters that
  * more bodies stand before than that pays for, and scenes of many emitters, are sampled
- * by shadow rays instead, which come with a standard error. Light through mirrors and
+ * by shadow rays instead, which come with a standard error. A punctual light takes one
+ * shadow ray and has no error. Light through mirrors and
  * panes is not direct: everything hides what is behind it. */
 #ifndef TWOPASS_DIRECT_H
 #define TWOPASS_DIRECT_H
@@ -31,11 +32,11 @@ void direct_worker_free(struct direct_worker *w);
  * O(emitters x bodies near the lines between). */
 void direct_begin(struct direct_worker *w, uint32_t element_side);
 
-/* Irradiance of the side at a point x (world) of its element from all emitters, into
+/* Irradiance of the side at a point x (world) of its element from all emitters and lights, into
  * h[bands], and its standard error into error[bands] (0 where it is exact). Shadow rays
  * are aimed by `seed`, as many as it takes for an error of `relative` times h, within
  * limits. The result depends on nothing else. 0, or -1 and e when memory is short.
- * O(emitters x bodies between). */
+ * O(emitters x bodies between + lights). */
 int direct_at(struct direct_worker *w, const double x[3], uint64_t seed, double relative,
               double *h, double *error, struct err *e);
 

@@ -21,7 +21,10 @@ static const double per_difference = .1;
 /* What interpolation may miss, relative to all irradiance, where no error is asked for. */
 static const double usual_miss = .01;
 
-enum { VALENCE = 64 };  /* corners of a group that are looked at together */
+enum {
+	VALENCE = 64,  /* corners of a group that are looked at together */
+	FEWEST = 64    /* rays of a point */
+};
 
 struct gather {
 	const struct view_scene *v;
@@ -345,6 +348,7 @@ void gather_at(struct gather *g, uint32_t element_side, const double x[3], const
 		p.n[k] = (side ? -1 : 1) * g->v->m->element_normal[3 * element + (size_t)k];
 	memcpy(p.x, x, sizeof p.x);
 	ray_leave(g->v->rays, p.n, p.x);
-	gather_point(&g->worker[thread], p.x, p.n, rng_mix(seed), g->o.rays, g->o.relative, all, h,
-	             error);
+	int rays = g->o.rays / g->o.samples > FEWEST ? g->o.rays / g->o.samples : FEWEST;
+	gather_point(&g->worker[thread], p.x, p.n, rng_mix(seed), rays,
+	             g->o.relative * sqrt(g->o.samples), all, h, error);
 }

@@ -22,7 +22,8 @@ struct gather;
 
 struct gather_options {
 	int rays;               /* from a point, if `relative` is 0 */
-	double relative;        /* standard error of a pixel that is aimed at, or 0 */
+	double relative;        /* standard error aimed at, relative to all irradiance, or 0 */
+	int samples;            /* of a pixel, that share rays where each gathers for itself */
 	int depth;              /* directional events that a gathering ray may go on after */
 	int threads;
 };

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "bsdf.h"
+#include "light.h"
 #include "mem.h"
 #include "pathtrace_parts.h"
 #include "vec3.h"
@@ -39,10 +40,26 @@ static double side_flux(struct pathtrace *p, size_t triangle, int side)
 	return sum / p->m->bands;
 }
 
+/* Mean of the bands' fluxes of all lights, cumulated; adds them to p->emitted. */
+static double list_lights(struct pathtrace *p)
+{
+	const struct model *m = p->m;
+
+	for (size_t i = 0; i < m->light.n; i++) {
+		double sum = 0;
+		for (int b = 0; b < m->bands; b++) {
+			p->emitted[b] += light_flux(m, i, b);
+			sum += light_flux(m, i, b) / m->bands;
+		}
+		p->light_below[i + 1] = p->light_below[i] + sum;
+	}
+	return p->light_below[m->light.n];
+}
+
 static int list_emitters(struct pathtrace *p, struct err *e)
 {
 	struct vec list = { 0 };
-	double total = 0;
+	double total = 0, lights = list_lights(p);
 
 	for (size_t i = 0; i < 2 * p->m->triangles; i++) {
 		double flux = side_flux(p, i / 2, (int)(i % 2));
@@ -65,7 +82,10 @@ static int list_emitters(struct pathtrace *p, struct err *e)
 		p->density[2 * (size_t)at->triangle + (size_t)at->side] =
 			at->chance / p->area[at->triangle];
 	}
-	return list.n ? 0 : err_set(e, "nothing emits light; give a material an emission");
+	for (size_t i = 0; i <= p->m->light.n && total + lights > 0; i++)
+		p->light_below[i] /= total + lights;
+	return total + lights > 0 ? 0 : err_set(e, "nothing emits light; give a material an "
+	                                        "emission, or add a light");
 }
 
 struct pathtrace *pathtrace_new(const struct model *m, const struct ray_scene *rays,
@@ -80,7 +100,8 @@ struct pathtrace *pathtrace_new(const struct model *m, const struct ray_scene *r
 	p->normal = mem_new(m->triangles, 3 * sizeof *p->normal, "triangle normals", e);
 	p->area = mem_new(m->triangles, sizeof *p->area, "triangle areas", e);
 	p->density = mem_new(m->triangles, 2 * sizeof *p->density, "emitters", e);
-	if (p->normal && p->area && p->density) {
+	p->light_below = mem_new(m->light.n + 1, sizeof *p->light_below, "lights", e);
+	if (p->normal && p->area && p->density && p->light_below) {
 		planes(p);
 		for (size_t i = 0; i < 2 * m->material.n; i++)
 			p->panes |= bsdf_has_ideal(&m->material, i / 2, (int)(i % 2), 1);
@@ -99,6 +120,7 @@ void pathtrace_free(struct pathtrace *p)
 	free(p->area);
 	free(p->density);
 	free(p->emitter);
+	free(p->light_below);
 	free(p);
 }
 
@@ -108,6 +130,14 @@ int pathtrace_diverges(const struct model *m)
 		return 0;
 	for (size_t i = 0; i < 4 * m->material.n; i++)
 		if (bsdf_has_lobe(&m->material, i / 4, (int)(i / 2 % 2), (int)(i % 2)))
+			return 1;
+	return 0;
+}
+
+int pathtrace_misses(const struct model *m)
+{
+	for (size_t i = 0; m->light.n && i < 2 * m->material.n; i++)
+		if (bsdf_has_ideal(&m->material, i / 2, (int)(i % 2), 0))
 			return 1;
 	return 0;
 }

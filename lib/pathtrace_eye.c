@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "bsdf.h"
+#include "light.h"
 #include "pathtrace_parts.h"
 #include "vec3.h"
 
@@ -124,6 +125,70 @@ static void add_direct(const struct pathtrace *p, const struct eye_path *path,
 		radiance[b] += f[b] * scale;
 }
 
+/* How a vertex sees a light; returns its irradiance, mean of the bands, if nothing is
+ * between. */
+static double sight(const struct pathtrace *p, const struct vertex *v, size_t light,
+                    struct light_sight *s)
+{
+	const double *intensity = &p->m->light.intensity[light * (size_t)p->m->bands];
+	double sum = 0;
+
+	light_see(&p->m->light, light, v->x, ray_offset(p->rays), s);
+	for (int b = 0; b < p->m->bands; b++)
+		sum += intensity[b] / p->m->bands;
+	return sum * s->across * s->falloff * fabs(v3_dot(v->n, s->toward));
+}
+
+/* Adds `times` what a vertex gets of a light. */
+static void add_light(const struct pathtrace *p, const struct eye_path *path,
+                      const struct vertex *v, size_t light, double times, double *radiance)
+{
+	const struct model *m = p->m;
+	const double *intensity = &m->light.intensity[light * (size_t)m->bands];
+	double wo[3] = { -path->dir[0], -path->dir[1], -path->dir[2] };
+	double f[BANDS_MAX], from[3], any = 0;
+	struct light_sight s;
+
+	sight(p, v, light, &s);
+	bsdf_eval(m, v->material, v->n, s.toward, wo, f);
+	double scale = times * s.across * s.falloff * fabs(v3_dot(v->n, s.toward));
+	for (int b = 0; b < m->bands; b++) {
+		f[b] *= path->throughput[b] * scale * intensity[b];
+		any = fmax(any, f[b]);
+	}
+	if (!(any > 0))
+		return;
+	pathtrace_leave(p, v->n, v->x, s.toward, from);
+	if (!light_through(p, from, s.to, f))
+		return;
+	for (int b = 0; b < m->bands; b++)
+		radiance[b] += f[b];
+}
+
+/* Next-event estimation of punctual lights: all for the first vertex, and then one, chosen
+ * by its irradiance. */
+static void add_lights(const struct pathtrace *p, const struct eye_path *path,
+                       const struct vertex *v, int first, double u, double *radiance)
+{
+	double sum = 0, left, here;
+	struct light_sight s;
+
+	for (size_t i = 0; i < p->m->light.n; i++) {
+		if (first)
+			add_light(p, path, v, i, 1, radiance);
+		else
+			sum += sight(p, v, i, &s);
+	}
+	left = u * sum;
+	for (size_t i = 0; sum > 0 && i < p->m->light.n; i++, left -= here) {
+		here = sight(p, v, i, &s);
+		if (here > 0 && left < here) {
+			add_light(p, path, v, i, sum / here, radiance);
+			return;
+		}
+	}
+}
+
 /* Extends the path. 0 = it ends. */
 static int scatter(const struct pathtrace *p, struct eye_path *path, const struct vertex *v,
                    struct rng *r)
@@ -159,7 +224,10 @@ static void follow(const struct pathtrace *p, struct eye_path *path, const doubl
 	for (int bounce = 0; see(p, path, &v); bounce++) {
 		double u[3] = { rng_uniform(r), rng_uniform(r), rng_uniform(r) };
 		add_emission(p, path, &v, radiance);
-		add_direct(p, path, &v, bounce ? u : light, radiance);
+		if (p->emitters)
+			add_direct(p, path, &v, bounce ? u : light, radiance);
+		if (p->m->light.n)
+			add_lights(p, path, &v, bounce == 0, u[0], radiance);
 		if (!scatter(p, path, &v, r))
 			return;
 		if (bounce >= FREE_BOUNCES && !pathtrace_roulette(path->throughput, p->m->bands, r))

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "bsdf.h"
+#include "light.h"
 #include "lobe.h"
 #include "mem.h"
 #include "pathtrace_parts.h"
@@ -27,9 +28,24 @@ static long batch_count(const struct pathtrace_options *o)
 	return o->samples < BATCHES ? o->samples : BATCHES;
 }
 
+/* A ray of a light, chosen by u < the chance of them all. */
+static void emit_light(const struct pathtrace *p, double u, struct rng *r, double org[3],
+                       double dir[3], double *flux)
+{
+	const struct model *m = p->m;
+	double ray[3] = { rng_uniform(r), rng_uniform(r), rng_uniform(r) };
+	size_t i = 0;
+
+	while (i + 1 < m->light.n && u >= p->light_below[i + 1])
+		i++;
+	light_ray(&m->light, i, ray, ray_offset(p->rays), org, dir);
+	for (int b = 0; b < m->bands; b++)
+		flux[b] = light_flux(m, i, b) / (p->light_below[i + 1] - p->light_below[i]);
+}
+
 /* A ray from a point of an emitter, with flux[bands] per particle. */
-static void emit(const struct pathtrace *p, struct rng *r, double org[3], double dir[3],
-                 double *flux)
+static void emit_patch(const struct pathtrace *p, struct rng *r, double org[3], double dir[3],
+                       double *flux)
 {
 	const struct model *m = p->m;
 	double u[5], x[3], normal[3];
@@ -49,6 +65,20 @@ static void emit(const struct pathtrace *p, struct rng *r, double org[3], double
 	for (int b = 0; b < m->bands; b++)
 		flux[b] = bsdf_exitance(&m->material, material, at->side, b) *
 		          p->area[at->triangle] / at->chance;
+}
+
+static void emit(const struct pathtrace *p, struct rng *r, double org[3], double dir[3],
+                 double *flux)
+{
+	double lights = p->light_below[p->m->light.n], u = lights > 0 ? rng_uniform(r) : 1;
+
+	if (u < lights) {
+		emit_light(p, u, r, org, dir, flux);
+		return;
+	}
+	emit_patch(p, r, org, dir, flux);
+	for (int b = 0; b < p->m->bands; b++)
+		flux[b] /= 1 - lights;
 }
 
 static void follow(const struct pathtrace *p, struct rng *r, double *tally, double *escaped)

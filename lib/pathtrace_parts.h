@@ -22,7 +22,9 @@ struct pathtrace {
 	size_t emitters;
 	struct emitter *emitter;
 	double *density;           /* [2 triangles] chance / area of a side, per m^2 */
-	double emitted[BANDS_MAX]; /* flux */
+	double emitted[BANDS_MAX]; /* flux, also of lights */
+	double *light_below;       /* [lights+1] sum of the chances of the lights before, by flux
+	                              among all that emits */
 	int panes;                 /* some material is a clear pane */
 };
 

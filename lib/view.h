@@ -20,10 +20,13 @@
 
 /* Layers beside R, G, B. Z, N, element and patch are those at the pixel's centre:
  * Z the camera depth (infinite where nothing is seen), N the geometric normal of
- * the side seen, element and patch their numbers (-1 where nothing is seen). */
+ * the side seen, element and patch their numbers (-1 where nothing is seen). Error is the
+ * estimated standard error of R, G, B: what interpolation and the noise of the solution
+ * leave in interpolated light, that of sampled light, and that of the pixel's samples among
+ * one another. */
 enum {
 	VIEW_DIFFUSE = 1, VIEW_DIRECTIONAL = 2, VIEW_EMISSION = 4, VIEW_Z = 8,
-	VIEW_N = 16, VIEW_ELEMENT = 32, VIEW_PATCH = 64, VIEW_ALL = 127
+	VIEW_N = 16, VIEW_ELEMENT = 32, VIEW_PATCH = 64, VIEW_ERROR = 128, VIEW_ALL = 255
 };
 
 /* Where diffuse light comes from: all of it interpolated between the elements; that from
@@ -33,6 +36,8 @@ enum view_method { VIEW_MESH, VIEW_DIRECT, VIEW_GATHER };
 
 struct view_options {
 	int samples;       /* a pixel; 1 = its centre, else stratified over it */
+	double relative;   /* sampling of a pixel stops where its standard error is this times
+	                      its radiance, after `samples` at the latest; 0: never */
 	int lobe_samples;  /* of a finite lobe; 0 = one ray in the mirror or
 	                      straight-through direction (the paper) */
 	int depth;         /* directional events followed */
@@ -47,6 +52,9 @@ struct view_stats {
 	double radiance;   /* mean over pixels, summed over bands */
 	double cut;        /* bound on what cut tails would have added to it; infinite
 	                      where no bound exists */
+	double error;      /* estimated relative rmse: the root mean square of standard errors
+	                      over the mean radiance, of pixels that show neither an emitter
+	                      nor nothing */
 };
 
 struct view_scene;

@@ -7,6 +7,7 @@
 #include "lobe.h"
 #include "rng.h"
 #include "vec3.h"
+#include "view_lights.h"
 #include "view_shade.h"
 
 /* Backs of one-sided materials in a row that a ray may pass. */
@@ -94,7 +95,7 @@ static int see(const struct view_scene *v, const double org[3], const double dir
 /* Has the rest of the light at a point computed and added later. */
 static void put_request(struct view_walker *w, const struct view_branch *b, struct point *p)
 {
-	struct view_request q = { .element = p->element, .side = p->side, .pixel = w->pixel,
+	struct view_request q = { .element = p->element, .side = p->side, .slot = w->slot,
 	                          .material = p->material, .directional = b->depth > 0,
 	                          .seed = b->seed + b->index };
 
@@ -118,12 +119,18 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b, str
 	if (computed && (s->diffuse || s->translucent))
 		put_request(w, b, p);
 	reconstruction_at(r, p->element, p->side, p->w, h);
-	for (size_t i = 0; i < bands; i++)
+	const float *miss = w->v->miss + (2 * (size_t)p->element + (size_t)p->side) * bands;
+	for (size_t i = 0; i < bands; i++) {
 		diffuse[i] += b->weight[i] * s->here[i] * h[i];
+		w->error[i] += b->weight[i] * s->here[i] * (double)miss[i];
+	}
 	if (s->translucent) {
 		reconstruction_at(r, p->element, !p->side, p->w, h);
-		for (size_t i = 0; i < bands; i++)
+		miss = w->v->miss + (2 * (size_t)p->element + (size_t)!p->side) * bands;
+		for (size_t i = 0; i < bands; i++) {
 			diffuse[i] += b->weight[i] * s->across[i] * h[i];
+			w->error[i] += b->weight[i] * s->across[i] * (double)miss[i];
+		}
 	}
 	if (!s->emits || w->unlit)
 		return;
@@ -131,6 +138,17 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b, str
 	bsdf_emission(w->v->m, p->material, p->n, out, h);
 	for (size_t i = 0; i < bands; i++)
 		emission[i] += b->weight[i] * h[i];
+}
+
+/* Adds the highlights of punctual lights, which no ray of a lobe can meet. */
+static void add_highlights(struct view_walker *w, const struct view_branch *b,
+                           const struct point *p)
+{
+	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] }, l[BANDS_MAX];
+
+	view_highlights(w->v, p->material, p->x, p->n, out, l, &w->rays);
+	for (int i = 0; i < w->v->m->bands; i++)
+		w->directional[i] += b->weight[i] * l[i];
 }
 
 /* Puts a branch that carries `scale` times `coefficient` of b's weight on the
@@ -237,6 +255,8 @@ static void follow_branch(struct view_walker *w, const struct view_branch *b)
 	if (!s->reflected.coefficient && !s->transmitted.coefficient)
 		return;
 	locate(v, &p);
+	if (v->highlights)
+		add_highlights(w, b, &p);
 	if (s->reflected.coefficient)
 		branch_off(w, b, &p, &s->reflected, 0);
 	if (s->transmitted.coefficient)

@@ -29,9 +29,12 @@ struct view_scene {
 	enum view_method method;
 	struct reconstruction all;  /* irradiance by all paths; empty where it is not needed */
 	struct reconstruction part; /* what of it is not computed for each point */
+	float *miss;                /* [2 elements][bands] standard error of the interpolated
+	                               irradiance of the part (of all by VIEW_MESH) */
 	struct direct *direct;
 	struct view_side *side;     /* [2 materials] */
 	int tails;                  /* something reflects or transmits directionally */
+	int highlights;             /* there are punctual lights, and finite lobes */
 	double ceiling[BANDS_MAX];  /* no radiance along an unsampled tail exceeds it */
 };
 
@@ -63,12 +66,13 @@ struct view_walker {
 	const struct view_scene *v;
 	const struct view_options *o;
 	struct view_shader *shader; /* for points whose light is to be computed; NULL: none is */
-	uint32_t pixel;             /* that it is told with them */
+	uint32_t slot;              /* of the sample, that it is told with them */
 	int unlit;                  /* emitters are black, and so are all backs of one-sided
 	                               materials: what gathering finds */
 	struct view_branch *stack;
 	size_t waiting;
 	double diffuse[BANDS_MAX], directional[BANDS_MAX], emission[BANDS_MAX];
+	double error[BANDS_MAX];    /* of interpolated light */
 	double cut[BANDS_MAX];
 	uint64_t rays;
 };

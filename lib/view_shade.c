@@ -4,9 +4,9 @@
 #include <string.h>
 
 int view_shader_init(struct view_shader *s, const struct view_scene *v, struct gather *gather,
-                     int thread, struct err *e)
+                     double relative, int thread, struct err *e)
 {
-	*s = (struct view_shader){ .v = v, .relative = 1e-2, .gather = gather, .thread = thread };
+	*s = (struct view_shader){ .v = v, .relative = relative, .gather = gather, .thread = thread };
 	s->direct = direct_worker_new(v->direct, e);
 	return s->direct ? 0 : -1;
 }
@@ -60,8 +60,8 @@ static void shade(struct view_shader *s, size_t request, int side, const struct 
 	const double *weight = (const double *)s->weight.data + request * bands;
 	const struct view_side *seen = &s->v->side[2 * q->material + (uint32_t)q->side];
 	const double *part = side == q->side ? seen->here : seen->across;
-	double *light = (q->directional ? to->directional : to->diffuse) + q->pixel * bands;
-	double *square = to->square + q->pixel * bands;
+	double *light = (q->directional ? to->directional : to->diffuse) + q->slot * bands;
+	double *square = to->square + q->slot * bands;
 	double h[BANDS_MAX], error[BANDS_MAX];
 
 	direct_begin(s->direct, 2 * q->element + (uint32_t)side);

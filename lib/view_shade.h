@@ -8,10 +8,10 @@
 #include "mem.h"
 #include "view_path.h"
 
-/* A point whose diffuse light goes, by `weight`, into a pixel's diffuse or directional
+/* A point whose diffuse light goes, by `weight`, into a sample's diffuse or directional
  * part. */
 struct view_request {
-	uint32_t element, material, pixel;
+	uint32_t element, material, slot;
 	int side, directional;
 	double x[3], w[3];          /* world; weights of the element's corners */
 	uint64_t seed;
@@ -32,15 +32,17 @@ struct view_shader {
 
 /* 0, or -1 and e. To be freed in any case. */
 int view_shader_init(struct view_shader *s, const struct view_scene *v, struct gather *gather,
-                     int thread, struct err *e);
+                     double relative, int thread, struct err *e);
 void view_shader_free(struct view_shader *s);
 
 void view_shader_put(struct view_shader *s, const struct view_request *q, const double *weight);
 
-/* Sums over the samples of a tile's pixels, [pixels][bands]. */
+/* Of samples, or sums over those of a pixel, [samples or pixels][bands]. */
 struct view_sums {
 	double *diffuse, *directional, *emission;
-	double *square;             /* of independent standard errors */
+	double *error;              /* of interpolated light: alike in all samples of a pixel */
+	double *square;             /* of standard errors of sampled light, independent */
+	double *spread;             /* sum of squared radiances */
 };
 
 /* Shades the points collected since the last call and forgets them. */

@@ -317,9 +317,21 @@ def two_pass():
     return s
 
 
+def lamps():
+    s = Scene("lamps")
+    s.rectangle("floor", [(-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)],
+                s.material("floor", {"rho_d": .5}))
+    s.light("bulb", "point", (-1, 0, 1), intensity=100)
+    s.light("beam", "spot", (1, 0, 2), (0, 0, -1), 200, cones=(10, 20))
+    s.light("sun", "directional", direction=(0, 3, -4), intensity=10)
+    s.camera("above", (0, -4, 4), (0, 0, 0), 45, 4 / 3, (0, 0, 1))
+    return s
+
+
 SCENES = {"cornell": cornell, "two-pass": two_pass, "furnace": furnace,
           "furnace-two-sided": furnace_two_sided, "plates": plates, "corner": corner,
-          "pane": pane, "mirror-image": mirror_image, "open-lobe": open_lobe}
+          "pane": pane, "mirror-image": mirror_image, "open-lobe": open_lobe,
+          "lamps": lamps}
 
 
 def main():

@@ -25,7 +25,11 @@ KEYS = ("rho_d", "tau_d", "rho_s", "tau_s")
 def oracles():
     """All scenes by id."""
     with open(os.path.join(DATA, "global_illumination.json"), encoding="utf-8") as f:
-        known = {o["id"]: o for o in json.load(f)["oracles"]}
+        data = json.load(f)
+    known = {o["id"]: o for o in data["oracles"]}
+    known["khodulev_cube"] = khodulev(known["khodulev_cube"])
+    point = next(a for a in data["analytic"] if a["id"] == "cie171_5.2_diffuse_point")
+    known[point["id"]] = small_lamp(point)
     with open(os.path.join(DATA, "cornell_box.json"), encoding="utf-8") as f:
         box = json.load(f)
     for wavelength in box["reference_mean_irradiance_per_unit_light_exitance"]:
@@ -65,11 +69,40 @@ def cornell(box, wavelength):
             "faces": faces, "expect": expect}
 
 
-def unsupported(oracle):
-    """Why an oracle cannot become a glTF file, or None."""
-    if not oracle["faces"]:
-        return "needs an emission that varies over the surface; no faces are given"
-    return None
+def khodulev(oracle):
+    """The cube, its point light, and what is said of any face as irradiance of the floor."""
+    rho, half = 2 / 3, 5
+    name = ["zmin", "zmax", "ymin", "ymax", "xmin", "xmax"]
+    square = [(-half, -half), (half, -half), (half, half), (-half, half)]
+    faces = []
+    for i, n in enumerate(name):
+        turn = lambda u, v, w: [(u, v, w), (w, u, v), (v, w, u)][i // 2]
+        at = half if i % 2 else -half
+        corners = [turn(u, v, at) for u, v in (square[::-1] if i % 2 else square)]
+        faces.append({"name": n, "mat": "wall", "verts": corners})
+    expect = []
+    for e in oracle["expect"]:
+        e = {**e, "side": "front", "rel_tol_hemicube": max(.01, e["rel_tol"])}
+        if e["quantity"] == "luminance":
+            x, y = e["offset_from_face_centre"]
+            e.update(quantity="H", stat="point", face="zmin", point=[x, y, -half],
+                     value=e["value"] * math.pi / rho)
+        expect.append(e)
+    return {**oracle, "materials": {"wall": {"front": {"rho_d": rho}, "back": {}}}, "faces": faces,
+            "lights": [{"name": "lamp", "kind": "point", "intensity": 50000}], "expect": expect}
+
+
+def small_lamp(oracle):
+    """CIE 171, 5.2: a source of 1000 cd straight down as a patch of 1 cm2, 3 m above a floor."""
+    materials = {"floor": {"front": {}, "back": {}},
+                 "lamp": {"front": {"E": math.pi * 1e7}, "back": {}}}
+    patch = lambda r, z: [(-r, -r, z), (r, -r, z), (r, r, z), (-r, r, z)]
+    faces = [{"name": "floor", "mat": "floor", "verts": patch(2, 0)},
+             {"name": "lamp", "mat": "lamp", "verts": patch(.005, 3)[::-1]}]
+    expect = [{"quantity": "H", "stat": "point", "face": "floor", "side": "front", "label": label,
+               "point": [x, y, 0], "value": h, "rel_tol": oracle["rel_tol"],
+               "rel_tol_hemicube": .01} for label, (x, y, h) in oracle["points"].items()]
+    return {**oracle, "materials": materials, "faces": faces, "expect": expect}
 
 
 def coefficients(side):
@@ -104,9 +137,9 @@ def is_rectangle(corners):
             abs(u @ v) < 1e-12 * np.linalg.norm(u) * np.linalg.norm(v))
 
 
-def scene_of(name, materials, faces, cameras=()):
+def scene_of(name, materials, faces, cameras=(), lights=()):
     """materials: {name: {"front": {E, rho_d, …, n}, "back": {…}}}, what is missing 0; faces: name, verts,
-    mat; cameras: (name, eye, target, yfov)."""
+    mat; cameras: (name, eye, target, yfov); lights: arguments of Scene.light."""
     s = Scene(name)
     known = {m: material(s, m, sides["front"], sides["back"])
              for m, sides in materials.items()}
@@ -117,6 +150,8 @@ def scene_of(name, materials, faces, cameras=()):
             s.shape(face["name"], Shape().polygon(*face["verts"]), known[face["mat"]])
     for view, eye, target, yfov in cameras:
         s.camera(view, eye, target, yfov, 1, (0, 0, 1))
+    for light in lights:
+        s.light(**light)
     return s
 
 
@@ -127,7 +162,8 @@ INSIDE = [("corner", (.1, .15, .2), (.9, .8, .7), 80), ("floor", (.5, .45, .9), 
 
 def convert(oracle, path):
     views = INSIDE if any(e.get("stat") == "every_pixel" for e in oracle["expect"]) else ()
-    scene_of(oracle["id"], oracle["materials"], oracle["faces"], views).write(path)
+    scene_of(oracle["id"], oracle["materials"], oracle["faces"], views,
+             oracle.get("lights", ())).write(path)
 
 
 def main():
@@ -137,9 +173,6 @@ def main():
         return
     if len(sys.argv) != 3 or sys.argv[1] not in known:
         sys.exit("usage: oracle2gltf.py ID OUT.gltf, or --list")
-    reason = unsupported(known[sys.argv[1]])
-    if reason:
-        sys.exit(f"oracle2gltf.py: {sys.argv[1]}: {reason}")
     convert(known[sys.argv[1]], sys.argv[2])
 
 

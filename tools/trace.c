@@ -20,7 +20,11 @@
 #include "common/cli.h"
 
 enum { OPT_EYE = 256, OPT_TARGET, OPT_UP, OPT_FOV, OPT_SAMPLES, OPT_LOBE_SAMPLES, OPT_DEPTH,
-       OPT_CUTOFF, OPT_HALF, OPT_COMPRESSION, OPT_LAYERS, OPT_MIX, OPT_GATHER_RAYS };
+       OPT_CUTOFF, OPT_HALF, OPT_COMPRESSION, OPT_LAYERS, OPT_MIX, OPT_GATHER_RAYS,
+       OPT_BUDGET };
+
+/* Where they are not given; samples at most where an error is aimed at. */
+enum { SAMPLES = 4, TARGET_SAMPLES = 64, GATHER_RAYS = 1024 };
 
 static const struct cli_option option_table[] = {
 	{ 'c', "camera", "NAME", "camera to render; repeatable, or 'all'" },
@@ -31,6 +35,8 @@ static const struct cli_option option_table[] = {
 	{ OPT_UP, "up", "X,Y,Z", "its upright direction (default: 0,1,0)" },
 	{ OPT_FOV, "fov", "DEGREES", "its vertical field of view (default: 50)" },
 	{ 'd', "diffuse", "METHOD", "where diffuse light comes from: mesh (default), direct, gather" },
+	{ 't', "error", "X", "relative standard error of pixels at which sampling stops" },
+	{ OPT_BUDGET, "budget", "SECONDS", "as many samples and rays as fit in, for each picture" },
 	{ OPT_SAMPLES, "samples", "N", "positions in each pixel (default: 4; 1: its centre)" },
 	{ OPT_LOBE_SAMPLES, "lobe-samples", "N",
 	  "rays into a finite lobe (default: 0: one, about its axis)" },
@@ -65,6 +71,7 @@ struct trace {
 	int has_eye, has_target, has_up;
 	double eye[3], target[3], up[3], fov;
 	enum view_method method;
+	double budget;              /* seconds for a picture; 0: not given */
 	struct view_options view;
 	struct exr_file_options exr;
 	/* the work */
@@ -141,6 +148,8 @@ static void take_option(struct trace *t, int letter)
 	case OPT_TARGET: t->has_target = vector(c, "--target", optarg, t->target); break;
 	case OPT_UP: t->has_up = vector(c, "--up", optarg, t->up); break;
 	case OPT_FOV: t->fov = cli_number(c, "--fov", optarg, 1e-3, 179.9); break;
+	case 't': t->view.relative = cli_number(c, "-t", optarg, 1e-6, 1); break;
+	case OPT_BUDGET: t->budget = cli_number(c, "--budget", optarg, 1e-3, 1e9); break;
 	case OPT_SAMPLES:
 		t->view.samples = (int)cli_integer(c, "--samples", optarg, 1, 1 << 16);
 		break;
@@ -181,6 +190,12 @@ static void parse(struct trace *t, int argc, char **argv)
 		cli_usage(c, "--eye and --target go together");
 	if (!t->has_eye && (t->has_up || t->fov > 0))
 		cli_usage(c, "--up and --fov belong to a view by --eye and --target");
+	if (t->budget > 0 && (t->view.relative > 0 || t->view.samples || t->view.gather_rays))
+		cli_usage(c, "--budget goes without -t, --samples and --gather-rays, which it chooses");
+	if (!t->view.samples)
+		t->view.samples = t->view.relative > 0 ? TARGET_SAMPLES : SAMPLES;
+	if (!t->view.gather_rays)
+		t->view.gather_rays = GATHER_RAYS;
 	t->view.threads = t->cli.threads;
 	t->results = strcmp(t->output, "-") == 0 ? stderr : stdout;
 }
@@ -229,7 +244,7 @@ static void picture_key(const struct trace *t, struct shot *s)
 {
 	const struct view_options *v = &t->view;
 	const double number[] = { s->frame.width, s->frame.height, v->samples, v->lobe_samples,
-		v->depth, v->cutoff, v->layers, t->method, v->gather_rays, t->exr.compression, t->exr.half };
+		v->depth, v->cutoff, v->layers, t->method, v->gather_rays, v->relative, t->budget, t->exr.compression, t->exr.half };
 	char camera[33];
 	struct digest *d = digest_new();
 
@@ -349,7 +364,8 @@ static int describe(const struct trace *t, const struct shot *s, const struct vi
 		snprintf(cut, sizeof cut, "%.9g", v->cut);
 	snprintf(statistics, sizeof statistics,
 	         "{\"samples\": %d, \"rays\": %" PRIu64 ", \"mean_radiance\": %.9g, "
-	         "\"cut_bound\": %s}", t->view.samples, v->rays, v->radiance, cut);
+	         "\"cut_bound\": %s, \"relative_error\": %.9g}", t->view.samples, v->rays,
+	         v->radiance, cut, v->error);
 	info->white_luminance = 1;
 	info->has_world_to_camera = 1;
 	camera_world_to_camera(&s->frame, info->world_to_camera);
@@ -374,6 +390,31 @@ static int write_picture(const struct trace *t, const struct shot *s,
 	return bad ? -1 : 0;
 }
 
+/* The best picture that the budget allows: a coarse one first, then as many times its
+ * samples and rays as fit in the time that is left. */
+static int render_within(const struct trace *t, const struct shot *s, const struct progress *progress,
+                         struct image *im, struct view_stats *v, struct err *e)
+{
+	enum { MOST = 12 }; /* doublings */
+	struct view_options o = t->view;
+	double begun = cli_seconds(), last = begun;
+	int level = 0, bad;
+
+	for (;;) {
+		image_free(im);
+		*im = (struct image){ 0 };
+		o.samples = 1 << level;
+		o.gather_rays = GATHER_RAYS / 8 << level;
+		bad = view_render(t->scene, &s->frame, &o, progress, im, v, e);
+		double now = cli_seconds(), left = t->budget - (now - begun);
+		double more = now > last ? .9 * left / (now - last) : 0;
+		if (bad || more < 2 || level == MOST)
+			return bad;
+		level = (int)fmin(MOST, level + floor(log2(more)));
+		last = now;
+	}
+}
+
 static int render(const struct trace *t, const struct shot *s, struct err *e)
 {
 	struct view_stats v = { 0 };
@@ -382,7 +423,9 @@ static int render(const struct trace *t, const struct shot *s, struct err *e)
 	char cut[96];
 	double begun = cli_seconds();
 	struct progress progress = cli_progress_begin(&bar, &t->cli, s->camera->name);
-	int bad = view_render(t->scene, &s->frame, &t->view, &progress, &im, &v, e);
+	int bad = t->budget > 0
+	        ? render_within(t, s, &progress, &im, &v, e)
+	        : view_render(t->scene, &s->frame, &t->view, &progress, &im, &v, e);
 
 	cli_progress_end(&bar);
 	double seconds = cli_seconds() - begun;
@@ -394,9 +437,9 @@ static int render(const struct trace *t, const struct shot *s, struct err *e)
 	cut_text(&v, cut, sizeof cut);
 	if (!t->cli.quiet)
 		fprintf(t->results, "%s: %s, %d x %d, %" PRIu64 " rays in %.3f s (%.2f Mray/s), "
-		        "written in %.3f s; %s\n", s->path, s->camera->name, s->frame.width,
+		        "written in %.3f s; estimated relative rmse %.2g; %s\n", s->path, s->camera->name, s->frame.width,
 		        s->frame.height, v.rays, seconds, (double)v.rays / seconds / 1e6, writing,
-		        cut);
+		        v.error, cut);
 	return 0;
 }
 
@@ -448,7 +491,7 @@ int main(int argc, char **argv)
 		.cli = { .program = "trace", .synopsis = "[options] FILE.rad -o PICTURE.exr",
 		         .about = "Render views of a solved scene, following mirrors and panes.",
 		         .options = option_table, .uses_threads = 1 },
-		.view = { .samples = 4, .depth = 32, .cutoff = 1e-3, .gather_rays = 1024 }
+		.view = { .depth = 32, .cutoff = 1e-3 }
 	};
 	struct err e = { 0 };
 	int status = 0;

@@ -60,6 +60,9 @@ shoot any.mesh
 trace -s 0x10 -c a any.rad
 trace -s 10 -c a any.rad
 trace --samples 0 -c a any.rad
+trace -t 2 -c a any.rad
+trace --budget 1 --samples 4 -c a any.rad -o a.exr
+trace --gather-rays 0 -c a any.rad
 trace -d sideways -c a any.rad
 trace --eye 0,0 --target 1,1,1 any.rad
 reference --samples 0 -c a any.mesh

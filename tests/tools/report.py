@@ -16,7 +16,7 @@ REPORT = os.path.join(TESTS, "bench", "report")
 sys.path[:0] = [REPORT, TESTS, os.path.join(os.path.dirname(TESTS), "scenes")]
 from chain import BUILD, TOP, Tap, picture, run
 from growth import Fit
-from yardstick import Ladder, Lattice, off
+from yardstick import Errors, Ladder, Lattice, off
 
 
 def lattice_depths(folder, width, height):
@@ -52,6 +52,11 @@ def errors(tap):
     true, n = np.full((3, 100000), 2.0), (3, 100000)
     a = true + rng.normal(0, .02, n)
     b, c = (true + rng.normal(0, .2, n) for _ in range(2))
+    e = Errors(a, true + (b - true) / 20, true + (c - true) / 20)
+    exact = np.percentile(np.sqrt(((a - true) ** 2).sum(0) / 12), 99)
+    tap.ok(abs(e.tail / exact - 1) < .02 and e.noise > .3 * exact,
+           "the 99th percentile of pixels under a yardstick a third as noisy",
+           f"got {e.tail}, not {exact}")
     tap.ok(abs(off(a, b, c) - .01) < .001, "an error of a tenth of the yardstick's noise",
            f"got {off(a, b, c)}")
 

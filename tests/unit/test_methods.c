@@ -221,12 +221,53 @@ static void test_gathered(void **state)
 	stage_free(&t);
 }
 
+/* Sampling stops where its error is small, and what is stated at edges is about what is
+ * left against many samples. */
+static void test_target(void **state)
+{
+	double eye[3] = { -1.5, -1, 1.3 }, target[3] = { 0, 0, .3 }, up[3] = { 0, 0, 1 };
+	enum { WIDE = 64, HIGH = 48, PIXELS = WIDE * HIGH };
+	struct view_options o = { .samples = 64, .depth = 4, .cutoff = 1e-3, .threads = 1,
+		                  .layers = VIEW_ERROR };
+	struct view_stats some, all;
+	struct camera c;
+	struct view_frame f;
+	struct image a, b;
+	struct stage t;
+	struct err e = { 0 };
+	(void)state;
+
+	room(&t);
+	stage_end(&t, .2, .3, .5);
+	struct view_scene *v = view_scene_new(&t.m, &t.s, t.rays, VIEW_DIRECT, 1, &e);
+	assert_non_null(v);
+	assert_int_equal(camera_look_at(eye, target, up, 70, &c, &e), 0);
+	assert_int_equal(camera_frame(&c, WIDE, HIGH, &f, &e), 0);
+	assert_int_equal(view_render(v, &f, &o, NULL, &b, &all, &e), 0);
+	o.relative = .1;
+	assert_int_equal(view_render(v, &f, &o, NULL, &a, &some, &e), 0);
+	assert_true(some.rays < all.rays / 4 && some.rays >= 4 * PIXELS);
+	double off = 0, stated = 0;
+	for (size_t i = 0; i < PIXELS; i++) {
+		double d = (double)(image_plane(&a, 0)[i] - image_plane(&b, 0)[i]);
+		double s = (double)image_plane(&a, 3)[i];
+		off += d * d;
+		stated += s * s;
+		assert_true(s >= 0);
+	}
+	assert_true(stated > off / 9 && stated < off * 9);
+	image_free(&a);
+	image_free(&b);
+	view_scene_free(v);
+	stage_free(&t);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_furnace), cmocka_unit_test(test_threads),
 		cmocka_unit_test(test_mirror), cmocka_unit_test(test_no_caustic_twice),
-		cmocka_unit_test(test_gathered),
+		cmocka_unit_test(test_gathered), cmocka_unit_test(test_target),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

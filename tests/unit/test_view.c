@@ -187,9 +187,10 @@ static void test_layers(void **state)
 	render(&t, &f, &o, &im);
 	static const char *const name[] = { "R", "G", "B", "diffuse.R", "diffuse.G", "diffuse.B",
 		"directional.R", "directional.G", "directional.B", "emission.R", "emission.G",
-		"emission.B", "Z", "N.X", "N.Y", "N.Z", "element", "patch" };
-	assert_int_equal(im.channels, 18);
-	for (int c = 0; c < 18; c++)
+		"emission.B", "Z", "N.X", "N.Y", "N.Z", "element", "patch", "error.R", "error.G",
+		"error.B" };
+	assert_int_equal(im.channels, 21);
+	for (int c = 0; c < 21; c++)
 		assert_string_equal(im.name[c], name[c]);
 	for (size_t p = 0; p < 24 * 20; p++)
 		for (int c = 0; c < 3; c++) {
@@ -247,7 +248,7 @@ static void test_threads(void **state)
 	struct view_stats sa = render(&t, &f, &o, &a);
 	o.threads = 4;
 	struct view_stats sb = render(&t, &f, &o, &b);
-	assert_memory_equal(a.pixel, b.pixel, 50 * 37 * 18 * sizeof *a.pixel);
+	assert_memory_equal(a.pixel, b.pixel, 50 * 37 * 21 * sizeof *a.pixel);
 	assert_true(sa.rays == sb.rays && sa.radiance == sb.radiance && sa.cut == sb.cut);
 	image_free(&a);
 	image_free(&b);

@@ -18,8 +18,9 @@ import time
 sys.dont_write_bytecode = True
 HERE = os.path.dirname(os.path.abspath(__file__))
 TESTS = os.path.dirname(os.path.dirname(HERE))
-sys.path[:0] = [HERE, TESTS, os.path.join(os.path.dirname(TESTS), "scenes")]
+sys.path[:0] = [HERE, os.path.dirname(HERE), TESTS, os.path.join(os.path.dirname(TESTS), "scenes")]
 
+import directional
 import exact
 import growth
 import page
@@ -34,9 +35,9 @@ from plan import FULL, PLAN, QUICK
 from yardstick import Scene
 
 SECTIONS = {"rates": rates.section, "views": views.section, "speed": speed.section,
-            "stated": stated.section, "exact": exact.oracles,
-            "form-factors": exact.form_factors, "lobes": exact.lobes,
-            "growth": growth.section}
+            "stated": stated.section, "exact": exact.oracles, "hard-cases": exact.hard_cases,
+            "form-factors": exact.form_factors, "lobes": directional.schemes,
+            "exponents": directional.exponent,            "growth": growth.section}
 MINUTES = 20
 
 

@@ -1,4 +1,4 @@
-"""What other scripts of tests/ find: exact answers, form factors, lobes."""
+"""What other scripts of tests/ find: exact answers, hard cases, form factors."""
 import os
 import re
 
@@ -8,8 +8,8 @@ from page import Bar, Listing, Table, Title, Words
 
 TESTS = os.path.join(TOP, "tests")
 ORACLES = os.path.join(TESTS, "oracles.py")
+HARD_CASES = os.path.join(TESTS, "hard_cases.py")
 FORM_FACTORS = os.path.join(TESTS, "bench", "form_factors.py")
-LOBES = os.path.join(TESTS, "bench", "lobes.py")
 SECONDS = 60  # a scene
 VIEW3D = [  # on one core of such a machine, measured before
     ["cube16", "1536", ".34", "3.4e-7 at most, 2.2e-4 relative, row sums 1.3e-6"],
@@ -23,7 +23,7 @@ VIEW3D = [  # on one core of such a machine, measured before
 def oracles(run):
     """Expected, got and tolerance of every scene with a known answer."""
     run.tell("exact answers")
-    printed, progress = script(ORACLES, *(run.plan.oracles or ["--all"]))
+    printed, progress = script(ORACLES, *run.plan.oracles)
     counts = re.search(r"^(\d+) lines, (\d+) FAIL", printed, re.MULTILINE)
     took = {}
     for scene, time in re.findall(r"^oracles: \S+ (\S+) .*?([\d.]+) s$", progress, re.MULTILINE):
@@ -33,12 +33,29 @@ def oracles(run):
     run.bars.append(Bar("every exact answer within its tolerance", f"all, ≤ {SECONDS} s a scene",
                         f"{counts.group(2)} of {counts.group(1)} lines fail" +
                         (f"; slowest {slowest}, {took[slowest]:.0f} s" if slowest else "")
-                        if counts else "", bool(good) if not run.plan.oracles else None))
+                        if counts else "", bool(good) if "--all" in run.plan.oracles else None))
     yield Title("Exact answers")
     yield Words("""`tests/oracles.py` on the scenes of `tests/data/global_illumination.json` and
         the Cornell box by wavelength; what each is run with is in its table `CLASSES`.""" +
-                (f" Here only {', '.join(run.plan.oracles)}." if run.plan.oracles else ""))
+                f" Here: `oracles.py {' '.join(run.plan.oracles)}`.")
     yield Listing(printed)
+
+
+def hard_cases(run):
+    """Scenes that are numerically hard."""
+    if not run.plan.hard:
+        return
+    run.tell("hard cases")
+    printed, _ = script(HARD_CASES)
+    good = re.findall(r"^ok \d+ - (?!.*# TODO)", printed, re.MULTILINE)
+    bad = re.findall(r"^(?:not ok \d+ - .*|ok \d+ - .*# TODO.*)$", printed, re.MULTILINE)
+    run.bars.append(Bar("hard cases behave as stated", "all", f"{len(good)} of {len(good) + len(bad)}",
+                        not bad))
+    yield Title("Hard cases")
+    yield Words(f"""`tests/hard_cases.py`: {len(good)} of {len(good) + len(bad)} statements on
+        the scenes of `tests/data/hard_cases.json` hold{', all but these:' if bad else '.'}""")
+    if bad:
+        yield Listing("\n".join(bad))
 
 
 def markdown(text):
@@ -65,19 +82,3 @@ def form_factors(run):
                 [r for r in VIEW3D if r[0] in plan.ff_scenes], left=1)
     if rest:
         yield Words(rest)
-
-
-def lobes(run):
-    """The paper's directional form factors, and those continued by rays."""
-    if not os.path.exists(LOBES):
-        return
-    run.tell("lobes")
-    printed, _ = script(LOBES, *run.plan.lobes)
-    yield Title("Directional form factors: the paper's scheme and others")
-    yield Words("""`tests/bench/lobes.py`: irradiance that only directional light brings, by each
-        scheme of form factors, against particles.""")
-    head, rows, rest = markdown(printed)
-    if rows:
-        yield Table("", head, rows, left=3)
-    if rest:
-        yield Listing(rest)

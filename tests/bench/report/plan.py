@@ -15,8 +15,13 @@ class Plan:
     steps: int               # of each growth
     ff_scenes: tuple
     ff_rays: int             # a patch, of their yardstick
-    oracles: tuple           # scenes with exact answers; empty: all
-    lobes: tuple             # arguments of lobes.py
+    oracles: tuple           # arguments of oracles.py
+    hard: bool               # whether hard cases are tried
+    lobe_scenes: tuple       # of lobes.py; empty: all
+    lobe_exponents: tuple
+    lobe_samples: int        # particles of the yardstick
+    lobe_size: float         # of patches and elements
+    exponents: tuple         # of a lobe that becomes a mirror
     most: dict = field(default_factory=dict)  # {(scene, method): settings}, fewer than all
 
     def settings(self, scene, method):
@@ -32,6 +37,7 @@ class Plan:
                 if fewer else "")
 
 
+EXPONENTS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000, 100_000, 1_000_000)
 PLAN = Plan(
     about="All in one run of less than 20 minutes on two processors; `make report FULL=1` "
           "measures more.",
@@ -40,7 +46,8 @@ PLAN = Plan(
              "clutter": (1024, 16_000_000)},
     ladder=(1, 4, 16, 64, 256), crowd=(10_000, 100_000, 1_000_000), repeat=1, repeat_views=3,
     solutions=99, steps=99, ff_scenes=("cube16", "cube24", "room", "city100"), ff_rays=40960,
-    oracles=(), lobes=(),
+    oracles=("--all", "--method", "rays"), hard=True, lobe_scenes=(), lobe_exponents=(20, 1000),
+    lobe_samples=1_000_000, lobe_size=.25, exponents=EXPONENTS,
     most={("two-pass", "analytic"): 0, ("clutter", "analytic"): 0, ("clutter", "hemicube"): 0,
           ("clutter", "rays"): 3, ("clutter", "auto"): 3})
 FULL = Plan(
@@ -49,10 +56,13 @@ FULL = Plan(
     ladder=(1, 4, 16, 64, 256, 1024), crowd=(10_000, 100_000, 1_000_000, 10_000_000), repeat=3,
     repeat_views=5, solutions=99, steps=99,
     ff_scenes=("cube16", "cube24", "room", "room-turned", "city100", "city370", "city2100"),
-    ff_rays=409600, oracles=(), lobes=())
+    ff_rays=409600, oracles=("--all",), hard=True, lobe_scenes=(),
+    lobe_exponents=(5, 20, 100, 1000), lobe_samples=16_000_000, lobe_size=.25, exponents=EXPONENTS)
 QUICK = Plan(
     about="A quick try of the programs: samples are so few that the errors mean nothing.",
     scenes=("cornell",), samples={name: (32, 100_000) for name in PLAN.scenes},
     ladder=(1, 4), crowd=(1000, 10_000), repeat=1, repeat_views=1, solutions=1, steps=3,
-    ff_scenes=("cube16",), ff_rays=4096, oracles=("furnace_hetero_diffuse",), lobes=(),
+    ff_scenes=("cube16",), ff_rays=4096, oracles=("furnace_hetero_diffuse",), hard=False,
+    lobe_scenes=("twice",), lobe_exponents=(20,), lobe_samples=100_000, lobe_size=.5,
+    exponents=(30, 1000, 10_000),
     most={"hemicube": 1, "rays": 1, "auto": 1, "analytic": 0, None: 1})

@@ -11,7 +11,7 @@ KINDS = {"svg": "svg size {wide},{high} font 'Helvetica,13' background 'white'",
          "png": "pngcairo size {wide},{high} font 'Helvetica,10'"}
 HEAD = """
 set logscale xy
-set grid xtics ytics lc rgb '#dddddd'
+set grid xtics ytics lt 1 lw .7 lc rgb '#d0d0d0'
 set border lc rgb '#666666'
 set tics nomirror
 set format '%g'

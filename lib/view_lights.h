@@ -1,0 +1,13 @@
+/* Highlights of punctual lights (private to the view). */
+#ifndef TWOPASS_VIEW_LIGHTS_H
+#define TWOPASS_VIEW_LIGHTS_H
+
+#include "view_path.h"
+
+/* Radiance into l[bands] that the finite lobes at a point x, n its front normal, send
+ * along `out` of what comes from punctual lights, straight or through clear panes. Adds
+ * to *rays. O(lights). */
+void view_highlights(const struct view_scene *v, uint32_t material, const double x[3],
+                     const double n[3], const double out[3], double *l, uint64_t *rays);
+
+#endif
