@@ -18,7 +18,7 @@ static const double cos_crease = .86602540378443865;
 static const double error_by_curvature = 1. / 3, error_by_roughness = 1.7;
 
 /* Noise is not equal everywhere: so much of it is taken for no detail. */
-static const double noise_guard = 1.5;
+static const double noise_guard = 2;
 
 enum { NEAR_MAX = 64, CHUNK = 256, PARTS = 2 };
 

@@ -65,7 +65,9 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		switch (letter) {
 		case 'o': r->output = optarg; break;
 		case 'e': r->solve.stop = cli_number(c, "--stop", optarg, 0, 1); break;
-		case 'n': r->solve.max_shots = (uint64_t)cli_integer(c, "--shots", optarg, 0, 0x7fffffffffffffff); break;
+		case 'n':
+			r->solve.max_shots = (uint64_t)cli_integer(c, "--shots", optarg, 0, INT64_MAX);
+			break;
 		case OPT_LIGHT_GROUPS: r->light_groups = 1; break;
 		case OPT_RESUME: r->resume = 1; break;
 		case OPT_LOG: r->log = optarg; break;
