@@ -108,6 +108,11 @@ void direct_worker_free(struct direct_worker *w)
 	free(w);
 }
 
+int direct_exact(const struct direct *d)
+{
+	return d->exact;
+}
+
 uint64_t direct_rays(const struct direct_worker *w)
 {
 	return w->rays;
