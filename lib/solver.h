@@ -59,7 +59,7 @@ void solver_lobe_shares(const struct solver *v, uint32_t ps, lanes *share);
 /* Books v->sent in the ledger, where `out` was taken from unshot flux. */
 void solver_book(struct solver *v, const lanes *out);
 
-/* Brings unshot / emitted of every component and group to `stop` or near it: GMRES for
+/* Brings unshot / emitted of every component and group well below `stop`: GMRES for
  * what is still to be sent, and one shot of that by all sides. 1 if it made less of it,
  * 0 if it did not, -1 and e. O(passes x runs). */
 int solver_overshoot(struct solver *v, double worst, double stop, struct err *e);
