@@ -8,10 +8,17 @@
 
 /* ---- what of a body is in front of a facet ---- */
 
-static void put_edge(struct blocker *o, const double a[3], const double b[3], int left, int right)
+static void put_corner(struct blocker *o, const double x[3])
+{
+	memcpy(o->corner[o->corners++], x, 3 * sizeof *x);
+}
+
+static void put_edge(struct blocker *o, const double a[3], const double b[3],
+                     const double along[3], int left, int right)
 {
 	memcpy(o->edge[o->edges].a, a, 3 * sizeof *a);
 	memcpy(o->edge[o->edges].b, b, 3 * sizeof *b);
+	memcpy(o->edge[o->edges].along, along, 3 * sizeof *along);
 	o->edge[o->edges].left = left;
 	o->edge[o->edges++].right = right;
 }
@@ -28,48 +35,65 @@ static void note_cut(struct cut *c, int face, const double x[3])
 		memcpy(c->point[face][c->points[face]++], x, 3 * sizeof *x);
 }
 
-int blocker_make(const struct body_set *s, uint32_t body, const struct facet *f,
-                 struct blocker *out)
+/* Edges, and what is cut off them. h: heights of the corners over the plane. */
+static void put_edges(const struct body_set *s, const struct body *b, const double *h,
+                      struct blocker *out, struct cut *cut)
 {
-	const struct body *b = &s->body[body];
-	struct cut cut = { { 0 }, { { { 0 } } } };
-
-	out->edges = 0;
-	out->apart = -1;
-	out->faces = (int)b->faces;
-	out->flat = b->flat;
-	memcpy(out->face, &s->face[b->face], b->faces * sizeof *out->face);
-	memcpy(out->centre, b->centre, sizeof out->centre);
 	for (uint32_t i = 0; i < b->edges; i++) {
 		const struct body_edge *e = &s->edge[b->edge + i];
 		const double *p = &s->corner[3 * (size_t)e->a], *q = &s->corner[3 * (size_t)e->b];
-		double hp = v3_dot(f->normal, p) - f->offset, hq = v3_dot(f->normal, q) - f->offset;
-		double x[3];
+		double hp = h[e->a - b->corner], hq = h[e->b - b->corner], x[3];
 		int p_in = hp >= -s->near, q_in = hq >= -s->near;
 		if (p_in && q_in) {
-			put_edge(out, p, q, e->left, e->right);
+			put_edge(out, p, q, e->along, e->left, e->right);
 			continue;
 		}
 		if (!p_in && !q_in)
 			continue;
 		if (p_in ? hp > s->near : hq > s->near) {
 			edge_divide(p, hp, q, hq, x);
-			put_edge(out, p_in ? p : x, p_in ? x : q, e->left, e->right);
+			put_corner(out, x);
+			put_edge(out, p_in ? p : x, p_in ? x : q, e->along, e->left, e->right);
 		} else {
 			memcpy(x, p_in ? p : q, sizeof x);
 		}
-		note_cut(&cut, e->left, x);
+		note_cut(cut, e->left, x);
 		if (!b->flat)
-			note_cut(&cut, e->right, x);
+			note_cut(cut, e->right, x);
 	}
+}
+
+int blocker_make(const struct body_set *s, uint32_t body, const struct facet *f,
+                 struct blocker *out)
+{
+	const struct body *b = &s->body[body];
+	struct cut cut = { { 0 }, { { { 0 } } } };
+	double h[BLOCKER_CORNERS], along[3];
+
+	out->corners = out->edges = 0;
+	out->faces = (int)b->faces;
+	out->flat = b->flat;
+	memcpy(out->face, &s->face[b->face], b->faces * sizeof *out->face);
+	out->face[b->faces].offset = -f->offset;
+	for (int k = 0; k < 3; k++)
+		out->face[b->faces].normal[k] = -f->normal[k];
+	for (uint32_t i = 0; i < b->corners; i++) {
+		const double *x = &s->corner[3 * (size_t)(b->corner + i)];
+		h[i] = v3_dot(f->normal, x) - f->offset;
+		if (h[i] >= -s->near)
+			put_corner(out, x);
+	}
+	put_edges(s, b, h, out, &cut);
 	for (int i = 0; i < out->faces && out->edges; i++)
-		if (cut.points[i] == 2)
-			put_edge(out, cut.point[i][0], cut.point[i][1], i, b->flat ? i : out->faces);
-	for (int k = 0; k < 3 && out->edges; k++) {
-		double sum = 0;
-		for (int i = 0; i < out->edges; i++)
-			sum += out->edge[i].a[k] + out->edge[i].b[k];
-		out->centre[k] = sum / (2 * out->edges);
+		if (cut.points[i] == 2) {
+			v3_sub(cut.point[i][1], cut.point[i][0], along);
+			v3_normalise(along);
+			put_edge(out, cut.point[i][0], cut.point[i][1], along, i, b->flat ? i : out->faces);
+		}
+	for (int k = 0; k < 3; k++) {
+		out->centre[k] = 0;
+		for (int i = 0; i < out->corners; i++)
+			out->centre[k] += out->corner[i][k] / out->corners;
 	}
 	return out->edges >= 3;
 }

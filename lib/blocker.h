@@ -5,18 +5,18 @@
 #include "body.h"
 #include "facet.h"
 
-enum { BLOCKER_EDGES = BODY_EDGES + BODY_FACES };
+enum { BLOCKER_EDGES = BODY_EDGES + BODY_FACES, BLOCKER_CORNERS = BLOCKER_EDGES };
 
 /* A body, or what of it is in front of a facet. */
 struct blocker {
-	int edges, faces, flat;
+	int corners, edges, faces, flat;
+	double corner[BLOCKER_CORNERS][3];
 	struct {
-		double a[3], b[3];
-		int left, right;      /* faces; `faces` = the cut, which no eye is in front of */
+		double a[3], b[3], along[3];  /* unit vector from a to b */
+		int left, right;      /* faces; `faces` is the cut */
 	} edge[BLOCKER_EDGES];
-	struct plane face[BODY_FACES];
+	struct plane face[BODY_FACES + 1];
 	double centre[3];
-	int apart;                /* an edge that had the last view on its far side, or -1 */
 };
 
 /* The part of a body in front of the plane of facet b into `out`. 0 if nothing is. */

@@ -7,6 +7,7 @@
 #include "body_inside.h"
 #include "body_polygons.h"
 #include "edges.h"
+#include "vec3.h"
 
 enum { LEAF = 2 };
 
@@ -48,9 +49,16 @@ static void begin_body(const struct maker *k, struct body *b)
 
 static int end_body(struct maker *k, struct body *b)
 {
+	const double *x = k->corner.data;
+
 	b->corners = (uint32_t)k->corner.n / 3 - b->corner;
 	b->edges = (uint32_t)k->edge.n - b->edge;
 	b->faces = (uint32_t)k->face.n - b->face;
+	for (size_t i = b->edge; i < k->edge.n; i++) {
+		struct body_edge *e = (struct body_edge *)k->edge.data + i;
+		v3_sub(&x[3 * (size_t)e->b], &x[3 * (size_t)e->a], e->along);
+		v3_normalise(e->along);
+	}
 	bound(k, b);
 	return vec_append(&k->body, b, 1, sizeof *b, k->e);
 }
@@ -86,7 +94,7 @@ static int put_flat(struct maker *k, uint32_t polygon)
 	begin_body(k, &b);
 	b.flat = 1;
 	for (uint32_t i = 0; i < q->n; i++) {
-		struct body_edge edge = { b.corner + i, b.corner + (i + 1) % q->n, 0, 0 };
+		struct body_edge edge = { .a = b.corner + i, .b = b.corner + (i + 1) % q->n };
 		if (vec_append(&k->corner, polygon_point(&k->p, q->first + i), 3, sizeof(double), k->e) ||
 		    vec_append(&k->edge, &edge, 1, sizeof edge, k->e))
 			return -1;

@@ -24,6 +24,7 @@ struct plane {
 struct body_edge {
 	uint32_t a, b;                /* corners, in body_set.corner */
 	uint16_t left, right;         /* faces of the body */
+	double along[3];              /* unit vector from a to b */
 };
 
 struct body {

@@ -1,7 +1,6 @@
 #include "contour.h"
 
-#include <string.h>
-
+#include "eye_polygon.h"
 #include "vec3.h"
 
 #define PI 3.14159265358979323846
@@ -10,22 +9,10 @@ enum { DEEPEST = 48 };        /* bisections of an edge, towards a corner it near
 
 double contour_point(const double x[3], const double normal[3], int n, const double *v)
 {
-	double sum = 0, first[3], a[3], b[3], c[3];
+	struct eye_polygon p;
 
-	v3_sub(v, x, first);
-	memcpy(a, first, sizeof a);
-	for (int i = 1; i <= n; i++) {
-		if (i < n)
-			v3_sub(&v[3 * i], x, b);
-		else
-			memcpy(b, first, sizeof b);
-		v3_cross(a, b, c);
-		double s = v3_length(c);
-		if (s > 0)
-			sum += v3_dot(c, normal) / s * atan2(s, v3_dot(a, b));
-		memcpy(a, b, sizeof a);
-	}
-	return -sum / (2 * PI);
+	eye_polygon_make(&p, x, n, v);
+	return eye_polygon_factor(&p, normal);
 }
 
 /* ---- the integral of ln r over a pair of edges ---- */

@@ -6,10 +6,8 @@
 
 #include "facet.h"
 
-/* Fraction of what a Lambertian surface element at x with unit normal n emits that
- * would reach a polygon with nothing between (Lambert 1760; Baum, Rushmeier & Winget,
- * SIGGRAPH 1989): sum over edges of angle times n . edge plane / 2 pi. v: [n][3], all in
- * front of the element; positive where v runs counter-clockwise seen from x. */
+/* Form factor from a surface element at x with a unit normal to a polygon with nothing
+ * between: see eye_polygon_factor(). v: [n][3]. */
 double contour_point(const double x[3], const double normal[3], int n, const double *v);
 
 /* Exchange area A_p F_pq = A_q F_qp, m^2, of two convex facets that lie in front of

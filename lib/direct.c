@@ -9,6 +9,7 @@
 #include "emitters.h"
 #include "facet_set.h"
 #include "light.h"
+#include "mem.h"
 #include "rng.h"
 #include "seen.h"
 #include "vec3.h"
@@ -102,10 +103,14 @@ void direct_worker_free(struct direct_worker *w)
 {
 	if (!w)
 		return;
-	seer_free(&w->seer);
 	free(w->outlook);
 	free(w->weight);
 	free(w);
+}
+
+int direct_exact(const struct direct *d)
+{
+	return d->exact;
 }
 
 uint64_t direct_rays(const struct direct_worker *w)
@@ -186,10 +191,10 @@ void direct_begin(struct direct_worker *w, uint32_t element_side)
 	w->element_side = element_side;
 	memcpy(w->normal, f.normal, sizeof w->normal);
 	w->outlooks = 0;
-	w->seer.near = d->bodies.near;
 	for (size_t i = 0; i < d->emitters.n && d->exact; i++)
 		w->outlooks += (size_t)look(w, &f, &d->emitters.emitter[i], &used,
 		                            &w->outlook[w->outlooks]);
+	seer_begin(&w->seer, used, d->bodies.near);
 }
 
 /* ---- by formula ---- */
@@ -223,23 +228,31 @@ static double lobe_part(const struct direct_worker *w, const struct emitter *t, 
 	return sum;
 }
 
-/* The same over what is seen of the polygon: a fan of triangles for each piece. */
-static double lobe_pieces(const struct direct_worker *w, const struct emitter *t, const double x[3])
+struct lobe_eye {
+	const struct direct_worker *w;
+	const struct emitter *t;
+	const double *x;
+};
+
+/* The same over a polygon as x sees it: a fan of triangles. */
+static double lobe_polygon(const struct eye_polygon *p, void *arg)
 {
-	size_t pieces;
-	const struct facet_piece *p = seen_pieces(&w->seer, &pieces);
+	const struct lobe_eye *o = arg;
 	double sum = 0;
 
-	for (size_t i = 0; i < pieces; i++)
-		for (int k = 1; k + 1 < p[i].n; k++) {
-			double corner[9];
-			struct facet f = { .n = 3, .v = corner };
-			memcpy(corner, p[i].v[0], 3 * sizeof *corner);
-			memcpy(corner + 3, p[i].v[k], 6 * sizeof *corner);
-			facet_measure(&f);
-			if (f.area > 0)
-				sum += lobe_part(w, t, x, &f, 0);
+	for (int k = 1; k + 1 < p->n; k++) {
+		double corner[9];
+		struct facet f = { .n = 3, .v = corner };
+		for (int i = 0; i < 3; i++) {
+			int c = i ? k + i - 1 : 0;
+			corner[3 * i] = o->x[0] + p->x[c];
+			corner[3 * i + 1] = o->x[1] + p->y[c];
+			corner[3 * i + 2] = o->x[2] + p->z[c];
 		}
+		facet_measure(&f);
+		if (f.area > 0)
+			sum += lobe_part(o->w, o->t, o->x, &f, 0);
+	}
 	return sum;
 }
 
@@ -253,10 +266,10 @@ static double exact(struct direct_worker *w, const struct outlook *o, const doub
 		return 0;
 	if (!o->blockers && t->exponent == 1)
 		return PI * fmax(0, contour_point(x, w->normal, o->f->n, o->f->v));
-	double f = seen(&w->seer, x, w->normal, o->f, o->blockers, e);
-	if (isnan(f))
-		return f;
-	return t->exponent == 1 ? PI * fmax(0, f) : lobe_pieces(w, t, x);
+	if (t->exponent == 1)
+		return PI * seen(&w->seer, x, w->normal, o->f, o->blockers, e);
+	struct lobe_eye eye = { w, t, x };
+	return seen_measured(&w->seer, x, o->f, o->blockers, lobe_polygon, &eye, e);
 }
 
 /* ---- by shadow rays ---- */

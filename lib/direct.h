@@ -40,6 +40,9 @@ void direct_begin(struct direct_worker *w, uint32_t element_side);
 int direct_at(struct direct_worker *w, const double x[3], uint64_t seed, double relative,
               double *h, double *error, struct err *e);
 
+/* 1 if emitters are few enough to be looked at one by one. */
+int direct_exact(const struct direct *d);
+
 /* Shadow rays traced so far. */
 uint64_t direct_rays(const struct direct_worker *w);
 

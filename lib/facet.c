@@ -4,27 +4,39 @@
 
 #include "vec3.h"
 
-void facet_measure(struct facet *f)
+/* Centre and radius; twice the area vector. */
+static void spread(struct facet *f, double twice[3])
 {
-	double twice[3] = { 0 }, far = 0, sum = 0;
+	double far = 0, first[3], a[3], b[3], c[3];
 
+	memset(f->centre, 0, sizeof f->centre);
+	for (int i = 0; i < f->n; i++)
+		v3_mad(f->centre, 1, &f->v[3 * i], f->centre);
 	for (int k = 0; k < 3; k++) {
-		f->centre[k] = 0;
-		for (int i = 0; i < f->n; i++)
-			f->centre[k] += f->v[3 * i + k] / f->n;
+		f->centre[k] /= f->n;
+		twice[k] = 0;
 	}
-	for (int i = 0; i < f->n; i++) {
-		double a[3], b[3], c[3];
-		v3_sub(&f->v[3 * i], f->centre, a);
-		v3_sub(&f->v[3 * ((i + 1) % f->n)], f->centre, b);
+	v3_sub(f->v, f->centre, first);
+	memcpy(a, first, sizeof a);
+	for (int i = 1; i <= f->n; i++) {
+		if (i < f->n)
+			v3_sub(&f->v[3 * i], f->centre, b);
+		else
+			memcpy(b, first, sizeof b);
 		v3_cross(a, b, c);
 		v3_mad(twice, 1, c, twice);
 		far = v3_dot(a, a) > far ? v3_dot(a, a) : far;
+		memcpy(a, b, sizeof a);
 	}
-	f->area = v3_length(twice) / 2;
 	f->radius = sqrt(far);
-	memcpy(f->normal, twice, sizeof f->normal);
-	v3_normalise(f->normal);
+}
+
+void facet_measure(struct facet *f)
+{
+	double sum = 0;
+
+	spread(f, f->normal);
+	f->area = v3_normalise(f->normal) / 2;
 	for (int i = 0; i < f->n; i++)
 		sum += v3_dot(f->normal, &f->v[3 * i]);
 	f->offset = sum / f->n;
@@ -70,9 +82,11 @@ int facet_clip(const struct facet *f, const double normal[3], double offset,
 		return 0;
 	struct facet g = { .n = n, .v = out->corner };
 	memcpy(out->corner, corner, (size_t)n * 3 * sizeof *corner);
-	facet_measure(&g);
+	double twice[3];
+	spread(&g, twice);
 	memcpy(g.normal, f->normal, sizeof g.normal);
 	g.offset = f->offset;
+	g.area = v3_dot(twice, g.normal) / 2;
 	out->f = g;
 	return g.area > 0;
 }

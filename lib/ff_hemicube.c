@@ -214,6 +214,8 @@ static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struc
 	if (j->shoots_diffuse[ps] || j->has_lobe[ps]) {
 		struct ff_batch unused = { 0 };
 		gather(t, ps);
+		if (j->emits[ps])
+			ff_share_pixels(t, ps);
 		if (tally_finish(&t->tally, j->shoots_diffuse[ps] ? b : &unused, ps, FF_DIFFUSE,
 		                 samples, 1, e))
 			return -1;

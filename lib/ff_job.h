@@ -46,6 +46,13 @@ struct ff_gather {
 	                             taken as its own */
 };
 
+/* A plane of ideal mirrors of one material; n points to the side that reflects. */
+struct ff_mirror {
+	double n[3], offset;
+	uint32_t material;
+	int side;
+};
+
 /* Shared, read-only while rows are computed. */
 struct ff_job {
 	const struct model *m;
@@ -64,6 +71,8 @@ struct ff_job {
 	uint8_t *is_source;       /* [2P] any light leaves here */
 	uint32_t chain_most;      /* where counts of ideal events of a colour stop */
 	int has_panes, has_ideal; /* any clear pane; any ideal surface */
+	struct ff_mirror *mirror; /* [mirrors] planes with images of lights; none if they are */
+	size_t mirrors;           /* so many that only rays will do */
 	struct ff_samples of_rows, of_gathering;
 	struct tally_places places;
 	struct ff_gather gather;
@@ -103,7 +112,8 @@ struct ff_thread {
 	int capturing;
 	double capture_weight;    /* of a capture, per weight of the ray */
 	uint32_t lobe_depth;      /* lobes that the row's light is followed through */
-	int bent_only;            /* landings of light that came straight are known */
+	int bent_only;            /* landings of light that came straight are known, and if
+	                             there are images, of light turned once */
 	double turned;            /* weight of the others, then */
 	struct capture now;       /* the sample being followed, while capturing */
 	struct hemicube cube;
@@ -214,7 +224,31 @@ int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_w
 
 /* All rows of one patch into the batch. 0, or -1 and e. */
 int ff_patch_rays(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
+/* Shares the light of patch-side ps, whose views are set and whose hemicubes are tallied,
+ * anew among elements that few pixels show. O(elements x points) rays. */
+void ff_share_pixels(struct ff_thread *t, uint32_t ps);
+
 int ff_patch_hemicube(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
+
+/* Finds job->mirror. O(triangles). 0, or -1 and e. */
+int ff_mirrors(struct ff_job *j, struct err *e);
+
+/* The image of a light in a mirror; its arrays are those of *i. 0 if it has none, being
+ * behind or in the plane. */
+struct ff_image {
+	struct lights l;          /* one */
+	double position[3], direction[3], cone[2], cosine[2], unit_flux;
+	uint8_t kind;
+};
+int ff_image(const struct ff_job *j, const struct ff_mirror *mirror, size_t light,
+             struct ff_image *i);
+
+/* The chain of events that a light's rays pass from `to` to `from`: straight and through
+ * clear panes; or by way of a mirror, when the ray from `from` towards the image meets it
+ * first. CHAIN_NONE if anything else is in their way. */
+uint32_t ff_clear_way(struct ff_thread *t, const double from[3], const double to[3]);
+uint32_t ff_mirror_way(struct ff_thread *t, const struct ff_mirror *mirror, size_t light,
+                       const double from[3], const double toward[3]);
 
 /* The row of a punctual light into the batch; none if it has no flux. 0, or -1 and e.
  * O(elements + rays). */

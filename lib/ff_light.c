@@ -2,8 +2,9 @@
  *
  * What comes straight, also through clear panes, is found from the elements: points of
  * each look at the light, and where all see it alike the value is exact: the element's
- * solid angle, or its area across the light. What mirrors turn is sampled with rays of the
- * light, which also tell whether any leaves the scene: if none does, values of elements
+ * solid angle, or its area across the light. The images of lights in plane mirrors are
+ * looked at likewise. What mirrors turn more often, or are not plane, is sampled with rays
+ * of the light, which also tell whether any leaves the scene: if none does, values of elements
  * that see the light in part are fitted so that the row adds up. */
 #include <math.h>
 
@@ -28,10 +29,12 @@ struct lit {
 	double toward[3];       /* summed directions to the light, weighted */
 };
 
-/* An element-side looking at a light. */
+/* An element-side looking at a light, or at its image in a mirror. */
 struct look {
 	const struct lights *l;
 	size_t light;
+	const struct ff_mirror *mirror; /* NULL: the light itself */
+	size_t original;        /* of an image */
 	uint32_t column;
 	double normal[3];
 	double clear;           /* rays end so far before the light */
@@ -43,40 +46,6 @@ struct look {
 	double squares[3];      /* summed all^2, all seen, seen^2 */
 	size_t first;           /* of its chains in t->lit */
 };
-
-/* The chain of clear panes that a light's rays pass straight from `to` to `from`, or
- * CHAIN_NONE if anything else is in their way. */
-static uint32_t clear_way(struct ff_thread *t, const double from[3], const double to[3])
-{
-	const struct ff_job *j = t->job;
-	struct chains *chains = &t->tally.chains;
-	double org[3] = { from[0], from[1], from[2] }, dir[3], n[3];
-	uint32_t chain = 0;
-	struct ray_hit hit;
-
-	t->rays++;
-	if (!ray_blocked(j->rays, from, to))
-		return 0;
-	for (uint32_t i = 0; j->has_panes && i <= j->o.depth && chain != CHAIN_NONE; i++) {
-		v3_sub(to, org, dir);
-		double left = v3_normalise(dir);
-		ray_nearest(j->rays, org, dir, &hit);
-		t->rays++;
-		if (hit.triangle == RAY_MISS || hit.t >= left)
-			return chain;
-		uint32_t material = j->m->surface.material[j->m->triangle_surface[hit.triangle]];
-		uint32_t arrival = (uint32_t)!hit.side;
-		if (!bsdf_has_ideal(&j->m->material, material, (int)arrival, 1))
-			return CHAIN_NONE;
-		chain = chains_child(chains, chain, chains->slot[4 * material + 2 * arrival + 1],
-		                     &t->tally.err);
-		ff_normal(j, locate(&j->locator, hit.triangle, (float)hit.w[1], (float)hit.w[2]),
-		          (int)arrival, n);
-		ff_hit_point(j, &hit, org);
-		ray_leave(j->rays, n, org);
-	}
-	return CHAIN_NONE;
-}
 
 /* ---- an element looks at the light ---- */
 
@@ -108,7 +77,8 @@ static void look_from(struct ff_thread *t, struct look *k, const double x[3])
 	k->squares[0] += all * all;
 	if (w > 0) {
 		ray_leave(t->job->rays, k->normal, from);
-		chain = clear_way(t, from, s.to);
+		chain = k->mirror ? ff_mirror_way(t, k->mirror, k->original, from, s.toward)
+		                  : ff_clear_way(t, from, s.to);
 	}
 	if (chain == CHAIN_NONE) {
 		k->none++;
@@ -176,41 +146,62 @@ static void weigh(struct ff_thread *t, const struct look *k)
 }
 
 /* The side of an element's plane that a light is on, or -1 in the plane. */
-static int side_towards(const struct ff_job *j, size_t light, uint32_t element, double clear)
+static int side_towards(const struct model *m, const struct lights *l, size_t light,
+                        uint32_t element, double clear)
 {
-	const struct model *m = j->m;
 	const double *n = &m->element_normal[3 * (size_t)element];
 	double to[3], height;
 
-	if (m->light.kind[light] == LIGHT_DIRECTIONAL) {
-		height = -v3_dot(&m->light.direction[3 * light], n);
+	if (l->kind[light] == LIGHT_DIRECTIONAL) {
+		height = -v3_dot(&l->direction[3 * light], n);
 		return height > 1e-14 ? FRONT : height < -1e-14 ? BACK : -1;
 	}
-	v3_sub(&m->light.position[3 * light],
-	       &m->vertex[3 * (size_t)m->element[3 * (size_t)element]], to);
+	v3_sub(&l->position[3 * light], &m->vertex[3 * (size_t)m->element[3 * (size_t)element]], to);
 	height = v3_dot(to, n);
 	return height > clear ? FRONT : height < -clear ? BACK : -1;
 }
 
-static void light_element(struct ff_thread *t, size_t light, uint32_t element)
+static void light_element(struct ff_thread *t, const struct look *from, uint32_t element)
 {
 	const struct ff_job *j = t->job;
-	double clear = ray_offset(j->rays);
 	uint32_t most = j->o.method == FF_HEMICUBE ? 0 : j->o.rays / POINTS_PART;
-	int side = side_towards(j, light, element, clear);
+	int side = side_towards(j->m, from->l, from->light, element, from->clear);
+	struct look k = *from;
 
 	if (side < 0)
 		return;
-	struct look k = { .l = &j->m->light, .light = light, .clear = clear, .first = t->lit.n,
-	                  .column = 2 * element + (uint32_t)side,
-	                  .seed = rng_mix(j->o.seed ^ rng_mix((uint64_t)light << 32 | element)) };
-
+	k.first = t->lit.n;
+	k.column = 2 * element + (uint32_t)side;
+	k.seed = rng_mix(from->seed ^ rng_mix(element));
 	ff_normal(j, element, side, k.normal);
 	look(t, &k, POINTS_FIRST);
 	if (k.full < k.points && k.none < k.points)
 		look(t, &k, most > POINTS_LEAST ? most : POINTS_LEAST);
 	if (t->lit.n > k.first)
 		weigh(t, &k);
+}
+
+/* All elements look at a light, and at its images. */
+static void light_elements(struct ff_thread *t, size_t light)
+{
+	const struct ff_job *j = t->job;
+	struct look k = { .l = &j->m->light, .light = light, .clear = ray_offset(j->rays),
+	                  .seed = rng_mix(j->o.seed ^ rng_mix(light)) };
+	struct ff_image image;
+
+	t->lit.n = 0;
+	for (uint32_t i = 0; i < j->m->elements; i++)
+		light_element(t, &k, i);
+	for (size_t m = 0; m < j->mirrors; m++) {
+		if (!ff_image(j, &j->mirror[m], light, &image))
+			continue;
+		k.l = &image.l;
+		k.light = 0;
+		k.mirror = &j->mirror[m];
+		k.original = light;
+		for (uint32_t i = 0; i < j->m->elements; i++)
+			light_element(t, &k, i);
+	}
 }
 
 /* ---- a row ---- */
@@ -252,7 +243,7 @@ static void fit(struct vec *all)
 			lit[i].value *= (1 - sure) / doubtful;
 }
 
-/* The straight light into the tally, whose weights count `rays` as 1. Returns the part
+/* What elements saw into the tally, whose weights count `rays` as 1. Returns the part
  * that came by chain 0. */
 static double put_straight(struct ff_thread *t, double rays)
 {
@@ -295,9 +286,7 @@ int ff_light_row(struct ff_thread *t, uint32_t light, struct ff_batch *b, struct
 	if (!(m->light.unit_flux[light] > 0))
 		return 0;
 	uint32_t rays = cast(t, light);
-	t->lit.n = 0;
-	for (uint32_t i = 0; i < m->elements; i++)
-		light_element(t, light, i);
+	light_elements(t, light);
 	int open = tally_rest(&t->tally, 0)->escape > 0;
 	if (!open)
 		fit(&t->lit);
@@ -332,7 +321,7 @@ int ff_light_captures(struct ff_thread *t, uint32_t ps, struct err *e)
 				c.l[k] = s.toward[k];
 			}
 			ray_leave(j->rays, n, from);
-			c.chain = clear_way(t, from, s.to);
+			c.chain = ff_clear_way(t, from, s.to);
 			if (c.chain != CHAIN_NONE && vec_append(&t->captures, &c, 1, sizeof c, e))
 				return -1;
 		}

@@ -175,7 +175,8 @@ static void judge(struct matrix *m, size_t r, struct ff_rest *rest)
 	row->side = m->side[m->first + r];
 	row->residual = 1 - sum;
 	row->error = row->error / area + m->thread[0].x.o.relative * sum;
-	if (row->residual > 0 && share_rest(m, r, rest) > 0)
+	/* What the formulas leave at any rate is not worth rays. */
+	if (row->residual > m->thread[0].x.o.relative && share_rest(m, r, rest) > 0)
 		row->residual = 0;
 	else if (row->residual <= CERTAIN * row->error)
 		m->closed[r] = 1;

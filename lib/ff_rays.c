@@ -16,7 +16,7 @@ struct flight {
 	uint32_t idle;     /* others since the last of these */
 	uint32_t lobes;
 	int tallied;       /* its landing is known already */
-	int bent;          /* it has been turned on its way */
+	uint32_t bends;    /* how often it has been turned on its way */
 	int splits;
 };
 
@@ -103,7 +103,7 @@ static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_
 	out->chain = chain;
 	out->lobes = in->lobes + t->tally.chains.finite[slot];
 	out->tallied = 0;
-	out->bent = in->bent || !transmitted || t->tally.chains.finite[slot];
+	out->bends = in->bends + (!transmitted || t->tally.chains.finite[slot]);
 	return part > 0;
 }
 
@@ -136,14 +136,15 @@ static int land(struct ff_thread *t, const struct flight *f, const struct ray_hi
 	const struct ff_job *j = t->job;
 
 	t->rays++;
-	t->turned += t->bent_only && f->bent ? f->w : 0;
+	int straight = t->bent_only && f->bends <= (j->mirrors > 0);
+	t->turned += t->bent_only && !straight ? f->w : 0;
 	if (hit->triangle == RAY_MISS) {
 		if (!f->tallied)
 			tally_rest(&t->tally, f->chain)->escape += f->w;
 		return 0;
 	}
 	uint32_t side = (uint32_t)hit->side, ps = 2 * j->m->element_patch[element] + side;
-	int known = f->tallied || (t->bent_only && !f->bent);
+	int known = f->tallied || straight;
 	if (j->is_black[ps]) {
 		if (!known)
 			tally_rest(&t->tally, f->chain)->black += f->w;
@@ -153,7 +154,7 @@ static int land(struct ff_thread *t, const struct flight *f, const struct ray_hi
 		tally_hit(&t->tally, f->chain, 2 * element + side, f->w, f->dir);
 	if (t->capturing)
 		capture(t, ps, f->chain, f->w);
-	int lobes_too = j->has_lobe[ps] && f->lobes < t->lobe_depth && (!t->bent_only || f->bent);
+	int lobes_too = j->has_lobe[ps] && f->lobes < t->lobe_depth && (!t->bent_only || f->bends);
 	if (!j->is_ideal[ps] && !lobes_too)
 		return 0;
 	uint32_t id = 4 * model_patch_material(j->m, ps >> 1) + 2 * side, slot[2];

@@ -134,13 +134,26 @@ static void centroid(const struct model *m, uint32_t element, double x[3])
 		v3_mad(x, 1. / 3, &m->vertex[3 * (size_t)m->element[3 * (size_t)element + (size_t)k]], x);
 }
 
+/* How far towards the middle it goes: where elements bend, no further than needed. */
+static double inwards(const struct model *m, const uint32_t *corner, const uint32_t *of, uint32_t n,
+                      uint32_t cluster)
+{
+	const double *first = &m->element_normal[3 * (size_t)(corner[cluster] / 3)];
+
+	for (uint32_t i = 0; i < n; i++)
+		if (of[i] == cluster && v3_dot(first, &m->element_normal[3 * (size_t)(corner[i] / 3)]) < 1 - 1e-6)
+			return 1e-3;
+	return towards_middle;
+}
+
 static void find_point(const struct gather *g, const uint32_t *corner, const uint32_t *of, uint32_t n,
                        uint32_t cluster, int side, struct corner_point *p)
 {
 	const struct model *m = g->v->m;
-	size_t bands = (size_t)m->bands;
 	const struct reconstruction *all = &g->v->all, *indirect = &g->table.indirect;
-	double middle[3] = { 0 }, c[3], area = 0;
+	const double *vertex = &m->vertex[3 * (size_t)m->element[corner[0]]];
+	double middle[3] = { 0 }, c[3], area = 0, step = inwards(m, corner, of, n, cluster);
+	size_t bands = (size_t)m->bands;
 
 	*p = (struct corner_point){ 0 };
 	for (uint32_t i = 0; i < n; i++) {
@@ -149,6 +162,7 @@ static void find_point(const struct gather *g, const uint32_t *corner, const uin
 		if (of[i] != cluster)
 			continue;
 		centroid(m, e, c);
+		v3_sub(c, vertex, c);
 		v3_mad(middle, a, c, middle);
 		v3_mad(p->n, side ? -a : a, &m->element_normal[3 * (size_t)e], p->n);
 		area += a;
@@ -157,21 +171,20 @@ static void find_point(const struct gather *g, const uint32_t *corner, const uin
 			for (size_t k = 0; k < 3; k++)
 				mean[k] = (2 * (3 * (size_t)e + k) + (size_t)side) * bands + b;
 			p->h[b] += a * (double)all->corner[at];
-			p->shift[b] += a * towards_middle *
+			p->shift[b] += a * step *
 			               (double)(indirect->corner[at] -
 			                        (indirect->corner[mean[0]] + indirect->corner[mean[1]] +
 			                         indirect->corner[mean[2]]) / 3);
 		}
 	}
-	const double *vertex = &m->vertex[3 * (size_t)m->element[corner[0]]];
 	for (size_t b = 0; b < bands; b++) {
 		p->h[b] /= area;
 		p->shift[b] /= area;
 	}
-	for (int k = 0; k < 3; k++)
-		middle[k] = middle[k] / area - vertex[k];
-	v3_mad(vertex, towards_middle, middle, p->x);
 	v3_normalise(p->n);
+	/* In the tangent plane: the middle of what bends is inside of it. */
+	v3_mad(middle, -v3_dot(middle, p->n), p->n, middle);
+	v3_mad(vertex, step / area, middle, p->x);
 	ray_leave(g->v->rays, p->n, p->x);
 }
 

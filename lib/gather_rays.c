@@ -122,7 +122,8 @@ static void find_kinds(struct gather_table *t, const struct solution *s)
 			continue;
 		if (side->reflected.coefficient || side->transmitted.coefficient)
 			t->kind[i] |= GATHER_TAIL;
-		if ((side->diffuse && rough(s, i)) || (side->translucent && rough(s, i ^ 1)))
+		if (direct_exact(t->v->direct) &&
+		    ((side->diffuse && rough(s, i)) || (side->translucent && rough(s, i ^ 1))))
 			t->kind[i] |= GATHER_ROUGH;
 	}
 }

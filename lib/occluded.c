@@ -9,11 +9,8 @@
 #include "shadow.h"
 #include "vec3.h"
 
-enum { CELL_CORNERS = FACET_CORNERS };
-
 struct cell {
-	int n;
-	double v[CELL_CORNERS][3];    /* convex */
+	struct facet_room shape;
 	uint64_t blockers;            /* that may hide something from it */
 	uint32_t edges, bends;        /* bits of those that may cross it */
 	double most;                  /* about its exchange area if nothing were hidden */
@@ -24,14 +21,14 @@ struct cell {
 /* What may be wrong with a cell, as a fraction of `most`: before it is compared with its
  * quarters; where its points may all have missed the edge of a shadow; where its corners
  * have, too, and known edges end it. */
-static const double unproved = .1, unseen = .02, unlikely = 1e-4;
+static const double unproved = .1, unseen = .1, unlikely = 1e-4;
 
 /* What its centre says of a cell that is not compared yet: nothing better than this. */
 static const double surmised = 1e-3;
 
 /* How many times smaller a quarter's error may be than that of the whole, at most: where a
  * shadow's edge is not known, the sum over quarters may agree by accident. */
-static const double fall = 4096;
+static const double fall = 256;
 
 enum { HALVINGS = 5 };        /* of the facet seen, to prove that several blockers hide it */
 
@@ -49,25 +46,23 @@ struct integral {
 
 void occluded_free(struct occluded *o)
 {
-	seer_free(&o->seer);
 	free(o->cell.data);
 	*o = (struct occluded){ 0 };
 }
 
 /* ---- cells ---- */
 
-static void set_corners(struct cell *c, const struct facet *f)
+static void set_shape(struct cell *c, const struct facet *f)
 {
-	c->n = f->n;
-	memcpy(c->v, f->v, (size_t)f->n * sizeof c->v[0]);
+	c->shape.f = *f;
+	memcpy(c->shape.corner, f->v, 3 * (size_t)f->n * sizeof *f->v);
 }
 
-static struct facet cell_facet(const struct cell *c)
+/* Cells move about: their corners go with them. */
+static const struct facet *shape_of(struct cell *c)
 {
-	struct facet f = { .n = c->n, .v = c->v[0] };
-
-	facet_measure(&f);
-	return f;
+	c->shape.f.v = c->shape.corner;
+	return &c->shape.f;
 }
 
 /* Settles a cell whose view is clear or hidden: 1. Otherwise narrows its blockers down. */
@@ -86,7 +81,7 @@ static int settle(struct integral *in, struct cell *c, const struct facet *f)
 
 static void measure(const struct integral *in, struct cell *c, const struct facet *f)
 {
-	double x[4][4 * CELL_CORNERS];
+	double x[4][4 * FACET_CORNERS];
 	struct cubature p = { 0, x[0], x[1], x[2], x[3] };
 
 	cubature_fill(f, 0, &p);
@@ -146,9 +141,10 @@ static double doubt(const struct integral *in, struct cell *c, const struct face
 		return unseen * c->most;
 	if (!(dark || c->bright))
 		return compared ? 0 : surmise(in, c, f);
-	for (int k = 0; k < c->n; k++) {
-		double s = seen(&in->o->seer, c->v[k], in->f->normal, in->g, c->blockers, in->e);
-		double all = contour_point(c->v[k], in->f->normal, in->g->n, in->g->v);
+	for (int k = 0; k < f->n; k++) {
+		const double *v = &f->v[3 * k];
+		double s = seen(&in->o->seer, v, in->f->normal, in->g, c->blockers, in->e);
+		double all = contour_point(v, in->f->normal, in->g->n, in->g->v);
 		if (all > 0)
 			off = fmax(off, fmin(1, dark ? s / all : 1 - s / all));
 	}
@@ -159,16 +155,16 @@ static double doubt(const struct integral *in, struct cell *c, const struct face
  * quarters. Returns their number. */
 static int divide(const struct integral *in, struct cell *c, struct facet_room part[4])
 {
-	struct facet f = cell_facet(c);
+	const struct facet *f = shape_of(c);
 	const struct plane *cut = NULL;
 
 	if (in->cut)
-		cut = best_cut(in, &in->shadows.edges, &c->edges, c, &f);
+		cut = best_cut(in, &in->shadows.edges, &c->edges, c, f);
 	if (in->cut && !cut)
-		cut = best_cut(in, &in->shadows.bends, &c->bends, c, &f);
+		cut = best_cut(in, &in->shadows.bends, &c->bends, c, f);
 	if (!cut)
-		return facet_quarter(&f, part) ? 4 : 0;
-	return facet_split(&f, cut->normal, cut->offset, part) ? 2 : 0;
+		return facet_quarter(f, part) ? 4 : 0;
+	return facet_split(f, cut->normal, cut->offset, part) ? 2 : 0;
 }
 
 /* Is it sure that the blockers together hide all from a cell that saw nothing? */
@@ -184,7 +180,7 @@ static int refine(struct integral *in, size_t i)
 	struct vec *cells = &in->o->cell;
 	struct cell c = ((struct cell *)cells->data)[i], part[4];
 	struct facet_room room[4];
-	double before = in->settled, area = cell_facet(&c).area, sum = 0;
+	double before = in->settled, area = c.shape.f.area, sum = 0;
 	int n = divide(in, &c, room), left = 0;
 
 	if (!n) { /* too small to divide */
@@ -196,7 +192,7 @@ static int refine(struct integral *in, size_t i)
 		const struct facet *f = &room[k].f;
 		part[left] = (struct cell){ .blockers = c.blockers, .edges = c.edges, .bends = c.bends,
 		                            .most = c.most * f->area / area };
-		set_corners(&part[left], f);
+		set_shape(&part[left], f);
 		if (settle(in, &part[left], f))
 			continue;
 		measure(in, &part[left], f);
@@ -209,9 +205,8 @@ static int refine(struct integral *in, size_t i)
 	int several = (c.blockers & (c.blockers - 1)) != 0;
 	double off = fabs(sum + in->settled - before - c.value) / ((several ? 1 : 3) * left);
 	for (int k = 0; k < left; k++) {
-		struct facet f = cell_facet(&part[k]);
 		double least = n == 4 ? c.error / fall : 0;
-		part[k].error = fmax(fmax(off, least), doubt(in, &part[k], &f, n == 4));
+		part[k].error = fmax(fmax(off, least), doubt(in, &part[k], shape_of(&part[k]), n == 4));
 	}
 	return vec_append(cells, part, (size_t)left, sizeof *part, in->e);
 }
@@ -221,7 +216,7 @@ static int put_whole(struct integral *in, uint64_t blockers, double most)
 	struct cell c = { .blockers = blockers, .most = most,
 	                  .edges = UINT32_MAX, .bends = UINT32_MAX };
 
-	set_corners(&c, in->f);
+	set_shape(&c, in->f);
 	if (settle(in, &c, in->f))
 		return 0;
 	measure(in, &c, in->f);
@@ -267,8 +262,8 @@ static double clearance(const struct occluded *o, const struct facet *f)
 	double least = INFINITY;
 
 	for (int i = 0; i < o->blockers; i++)
-		for (int k = 0; k < o->seer.blocker[i].edges; k++)
-			least = fmin(least, fmax(0, v3_dot(f->normal, o->seer.blocker[i].edge[k].a) -
+		for (int k = 0; k < o->seer.blocker[i].corners; k++)
+			least = fmin(least, fmax(0, v3_dot(f->normal, o->seer.blocker[i].corner[k]) -
 			                            f->offset));
 	return least;
 }
@@ -285,7 +280,7 @@ double occluded_exchange(struct occluded *o, struct clear *clear, const struct s
 		in.g = l->a;
 		make_blockers(o, l, l->a);
 	}
-	o->seer.near = in.near;
+	seer_begin(&o->seer, o->blockers, in.near);
 	o->cell.n = 0;
 	uint64_t all = o->blockers ? UINT64_MAX >> (64 - o->blockers) : 0;
 	/* Cutting pays where more is asked for than cells across shadows' edges can tell. */

@@ -5,6 +5,7 @@
 #define TWOPASS_OCCLUDED_H
 
 #include "clear.h"
+#include "mem.h"
 #include "seen.h"
 
 /* One thread's scratch space; begin with {0}, release with occluded_free. */

@@ -2,36 +2,56 @@
 #ifndef TWOPASS_SEEN_H
 #define TWOPASS_SEEN_H
 
-#include "mem.h"
+#include "err.h"
+#include "eye_polygon.h"
 #include "sight.h"
 
-/* A convex piece gains a corner at most from each plane that cuts it: those of a facet and
- * of a blocker's silhouette. */
-enum { PIECE_CORNERS = 80 };
+enum { OUTLINE_EDGES = 64 };
 
-struct facet_piece {
-	int n;
-	double v[PIECE_CORNERS][3];
+/* The silhouette of a blocker for all eyes that have the same of its faces in front. */
+struct outline {
+	uint64_t front;               /* bits of those faces; 0: not known */
+	int edges;
+	double a[3][OUTLINE_EDGES];   /* by coordinate: a corner of each edge */
+	double d[3][OUTLINE_EDGES];   /* along it, (a - eye) x d to the inside */
 };
 
-/* One thread's scratch space and the blockers; begin with {0}, release with seer_free. */
+/* Planes through the eye and the edges of an outline, their normals to the inside. */
+struct outline_planes {
+	double x[OUTLINE_EDGES], y[OUTLINE_EDGES], z[OUTLINE_EDGES];
+	double size[OUTLINE_EDGES];   /* of the factors of each normal */
+};
+
+/* Something additive of polygons that an eye sees. */
+typedef double (*seen_measure)(const struct eye_polygon *p, void *arg);
+
+/* One thread's scratch space and the blockers. */
 struct seer {
 	struct blocker blocker[SIGHT_BLOCKERS];
 	double near;                  /* of the body set */
-	struct vec piece, next;       /* what is still visible, convex */
 	int hid;                      /* set when a blocker hides something */
 	double evaluations;           /* so far */
+	/* The eye in work. */
+	double reach;                 /* of the farthest corner of what is looked at */
+	seen_measure measure;
+	void *arg;
+	int overlaps;                 /* see seen.c */
+	int full;                     /* a polygon has too many corners */
+	struct outline outline[SIGHT_BLOCKERS];
+	struct outline_planes planes[SIGHT_BLOCKERS];
 };
 
-void seer_free(struct seer *s);
+/* To be called when blockers have changed. */
+void seer_begin(struct seer *s, int blockers, double near);
 
 /* The form factor from a point x with a unit normal to what it sees of facet g, which is
  * in front of it; exact. blockers: a bit for each that may hide something. NaN and e when
- * memory is short. */
+ * polygons have too many corners. */
 double seen(struct seer *s, const double x[3], const double normal[3], const struct facet *g,
             uint64_t blockers, struct err *e);
 
-/* The n convex pieces that the last call found visible; valid until the next. */
-const struct facet_piece *seen_pieces(const struct seer *s, size_t *n);
+/* The same for any measure: its sum over convex polygons that are together what is seen. */
+double seen_measured(struct seer *s, const double x[3], const struct facet *g, uint64_t blockers,
+                     seen_measure measure, void *arg, struct err *e);
 
 #endif

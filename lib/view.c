@@ -17,7 +17,7 @@ enum {
 };
 
 /* That shadow rays aim at, relative to direct light, where no error is asked for. */
-static const double usual_error = .01;
+static const double usual_error = .03;
 
 /* Variance of the mean of n samples that are stratified over a pixel over that of samples
  * which are not, divided by sqrt(n). Measured at edges, with 2 to 16 samples. */

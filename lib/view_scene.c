@@ -122,30 +122,41 @@ static int part_solution(const struct solution *s, unsigned parts, struct soluti
 	return out->error && out->discretisation ? 0 : -1;
 }
 
-/* The standard error of what is interpolated: of its noise, which emitters by formula have
- * no part in, and of interpolation. */
-static int find_misses(struct view_scene *v, const struct solution *s, int threads, struct err *e)
+/* The errors of the parts that are interpolated: noise, which light straight from emitters
+ * by formula has no part in, by their share; discretisation estimated anew. */
+static int part_errors(const struct view_scene *v, const struct solution *s, int threads,
+                       struct solution *some, struct err *e)
 {
 	unsigned parts = interpolated[v->method];
 	size_t n = s->element_sides * (size_t)s->bands;
-	struct solution some = { 0 };
-	int bad = part_solution(s, parts, &some, e);
 
-	v->miss = mem_new(n, sizeof *v->miss, "errors", e);
-	bad = bad || !v->miss;
-	for (size_t i = 0; i < n && !bad; i++) {
-		double h = some.direct[i] + some.caustic[i] + some.indirect[i];
-		double all = h;
+	if (part_solution(s, parts, some, e))
+		return -1;
+	for (size_t i = 0; i < n && s->error; i++) {
+		double h = some->direct[i] + some->caustic[i] + some->indirect[i], all = h;
 		for (size_t g = 0; g < s->groups && parts == PART_CAUSTIC; g++)
 			all += s->direct[g * n + i] + s->indirect[g * n + i];
-		some.error[i] = s->error && all > 0 ? s->error[i] * h / all : 0;
+		some->error[i] = all > 0 ? s->error[i] * h / all : 0;
 	}
-	bad = bad || discretisation_estimate(v->m, &some, threads, e);
-	for (size_t i = 0; i < n && !bad; i++)
-		v->miss[i] = (float)hypot(noise_left * some.error[i],
-		                          discretisation_left * some.discretisation[i]);
+	return discretisation_estimate(v->m, some, threads, e);
+}
+
+/* The standard error of what is interpolated. */
+static int find_misses(struct view_scene *v, const struct solution *s, int threads, struct err *e)
+{
+	size_t n = s->element_sides * (size_t)s->bands;
+	struct solution some = { 0 };
+	int whole = v->method == VIEW_MESH;
+	int bad = whole ? 0 : part_errors(v, s, threads, &some, e);
+	const double *noise = whole ? s->error : some.error;
+	const double *missed = whole ? s->discretisation : some.discretisation;
+
+	v->miss = mem_new(n, sizeof *v->miss, "errors", e);
+	for (size_t i = 0; i < n && v->miss && !bad; i++)
+		v->miss[i] = (float)hypot(noise ? noise_left * noise[i] : 0,
+		                          missed ? discretisation_left * missed[i] : 0);
 	solution_free(&some);
-	return bad ? -1 : 0;
+	return bad || !v->miss ? -1 : 0;
 }
 
 /* All light is interpolated where it is not recomputed, and behind what blurs it. */

@@ -191,12 +191,13 @@ def main():
     p.add_argument("--samples", type=int, default=4000000, help="particles of the yardstick")
     p.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join(SCENES))
     a = p.parse_args()
-    print(f"{'scene':12} {'n':>7} {'scheme':10} {'rms':>10} {'flux':>10} {'yardstick':>9} {'stated':>9} {'seconds':>7}")
+    print("| scene | exponent | scheme | rms error | of flux | yardstick | stated | seconds |\n"
+          "| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: |")
     for name in a.scenes or SCENES:
         for n in a.n.split(","):
             for scheme, r in compare(name, float(n), a.schemes.split(","), a.samples, a.size):
-                print(f"{name:12} {n:>7} {scheme:10} {100 * r.rms:8.2f} % {100 * r.flux:+8.2f} % "
-                      f"{100 * r.noise:7.2f} % {100 * r.stated:7.2f} % {r.seconds:7.2f}", flush=True)
+                print(f"| {name} | {n} | {scheme} | {100 * r.rms:.2f} % | {100 * r.flux:+.2f} % | "
+                      f"{100 * r.noise:.2f} % | {100 * r.stated:.2f} % | {r.seconds:.2f} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -61,7 +61,8 @@ static void scene(uint64_t seed, int every, double tolerance)
 	struct err e = { 0 };
 	double centre[3];
 	struct exchanger x, y;
-	struct exchange_options o = { .relative = 1e-9, .absolute = tolerance, .most = 20000 };
+	struct exchange_options o = { .relative = 1e-9, .absolute = tolerance, .most = 20000,
+	                              .bodies = SIGHT_BLOCKERS };
 
 	if (random_scene(&m, seed) || facet_set_init(&s, &m, FACETS_OF_PATCHES, &e) ||
 	    body_set_init(&bodies, &m, &e)) {

@@ -324,24 +324,25 @@ static void test_seen(void **state)
 		struct lab l = { 0 };
 		struct dice d = { seed, 1000 };
 		struct err e = { 0 };
-		struct seer seer = { 0 };
+		static struct seer seer;
 		assert_int_equal(random_scene(&l.m, seed), 0);
 		ready(&l, 1e-6);
-		seer.near = l.bodies.near;
+		const double near = l.bodies.near;
 		for (int pair = 0; pair < 300; pair++) {
 			struct facet_room room[2];
 			struct facet f, g;
 			struct sight_line s = { .most = SIGHT_BLOCKERS };
 			const struct facet *a = &l.s.facet[roll_int(&d, 0, (int)l.s.facets - 1)];
 			const struct facet *b = &l.s.facet[roll_int(&d, 0, (int)l.s.facets - 1)];
-			if (a == b || !in_front(a, b, seer.near, &room[0], &f) ||
-			    !in_front(b, a, seer.near, &room[1], &g))
+			if (a == b || !in_front(a, b, near, &room[0], &f) ||
+			    !in_front(b, a, near, &room[1], &g))
 				continue;
 			enum sight sight = sight_find(&s, &l.bodies, &f, &g);
 			int blockers = 0;
 			for (int i = 0; sight == SIGHT_PART && i < s.bodies; i++)
 				blockers += blocker_make(&l.bodies, s.body[i], &g, &seer.blocker[blockers]);
-			brute_begin(&brute, &l.m, l.centre, &f, &g, seer.near);
+			seer_begin(&seer, blockers, near);
+			brute_begin(&brute, &l.m, l.centre, &f, &g, near);
 			for (int k = 0; k < 4; k++) {
 				double x[3], u = sqrt(roll(&d, 0, 1)), w = roll(&d, 0, 1);
 				int c = roll_int(&d, 1, f.n - 2);
@@ -355,7 +356,6 @@ static void test_seen(void **state)
 					         (int)(a - l.s.facet), (int)(b - l.s.facet), got, exact, (int)sight);
 			}
 		}
-		seer_free(&seer);
 		finish(&l);
 	}
 }

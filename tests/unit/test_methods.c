@@ -83,7 +83,7 @@ static void set(struct model *m, size_t material, double rho_d, double tau_d, do
 	}
 }
 
-/* A closed box and a sheet in it that transmits, all emitting .5 / pi: half of the
+/* A closed box and a bent sheet in it that transmits, all emitting .5 / pi: half of the
  * irradiance of 1 is direct everywhere. */
 static void furnace(struct stage *t)
 {
@@ -97,6 +97,8 @@ static void furnace(struct stage *t)
 	t->m.material.one_sided[0] = 1;
 	grid_box(&t->m, 3, material, lo, hi);
 	grid_quad(&t->m, 3, 1, o, x, y);
+	for (size_t i = t->m.vertices - 4 * 4; i < t->m.vertices; i++)
+		t->m.vertex[3 * i + 2] -= .1 * t->m.vertex[3 * i] * t->m.vertex[3 * i];
 	stage_end(t, .5, 0, .5);
 }
 
