@@ -88,7 +88,8 @@ static void look_from(struct ff_thread *t, struct look *k, const double x[3])
 	k->seen += w;
 	k->squares[1] += all * w;
 	k->squares[2] += w * w;
-	k->full += s.falloff >= 1 && ((struct lit *)t->lit.data)[k->first].chain == chain;
+	k->full += s.falloff >= 1 && t->lit.n > k->first &&
+	           ((struct lit *)t->lit.data)[k->first].chain == chain;
 }
 
 static void look(struct ff_thread *t, struct look *k, uint32_t points)

@@ -95,6 +95,14 @@ void gather_free(struct gather *g)
 	free(g);
 }
 
+int gather_check(const struct gather *g, struct err *e)
+{
+	for (int t = 0; t < g->o.threads; t++)
+		if (g->worker[t].e.set)
+			return err_set(e, "%s", g->worker[t].e.text);
+	return 0;
+}
+
 uint64_t gather_rays(const struct gather *g)
 {
 	uint64_t sum = 0;

@@ -45,6 +45,9 @@ void gather_corners(struct gather *g, const struct progress *progress);
 void gather_at(struct gather *g, uint32_t element_side, const double x[3], const double w[3],
                uint64_t seed, int thread, double *h, double *error);
 
+/* 0, or -1 and e if memory was short. */
+int gather_check(const struct gather *g, struct err *e);
+
 /* Rays traced so far. */
 uint64_t gather_rays(const struct gather *g);
 

@@ -459,7 +459,7 @@ static int failed(const struct render *r, struct err *e)
 	for (int t = 0; t < r->o->threads; t++)
 		if (r->worker[t].shader.e.set)
 			return err_set(e, "%s", r->worker[t].shader.e.text);
-	return 0;
+	return r->gather ? gather_check(r->gather, e) : 0;
 }
 
 int view_render(const struct view_scene *v, const struct view_frame *f,

@@ -39,7 +39,11 @@ def good():
     attributes = {"POSITION": 4, "NORMAL": 2, "TEXCOORD_0": 3}
     g = {
         "asset": {"version": "2.0"},
-        "extensionsUsed": ["KHR_materials_ior", "KHR_materials_emissive_strength"],
+        "extensionsUsed": ["KHR_materials_ior", "KHR_materials_emissive_strength",
+                           "KHR_lights_punctual"],
+        "extensions": {"KHR_lights_punctual": {"lights": [
+            {"name": "beam", "type": "spot", "color": [1, .5, .25], "intensity": 3,
+             "spot": {"innerConeAngle": .1, "outerConeAngle": .5}}]}},
         "extensionsRequired": ["KHR_materials_ior"],
         "scene": 0,
         "scenes": [{"name": "all", "nodes": [0, 3]}],
@@ -48,7 +52,7 @@ def good():
             {"name": "box", "mesh": 0, "scale": [2, 3, 1], "rotation": [0, 0, 0, 1]},
             {"name": "lamp", "mesh": 1,
              "matrix": [.1, 0, 0, 0, 0, .1, 0, 0, 0, 0, .1, 0, .5, .5, .5, 1]},
-            {"name": "eye", "camera": 0}],
+            {"name": "eye", "camera": 0, "extensions": {"KHR_lights_punctual": {"light": 0}}}],
         "meshes": [{"primitives": [{"attributes": attributes, "indices": 1, "material": 0,
                                     "mode": 4}]},
                    {"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 1}]}],
@@ -99,6 +103,8 @@ WRONG = [
     ("del g['asset']", "asset: is missing"),
     ("g['extensionsRequired'] = ['KHR_draco_mesh_compression']", "KHR_draco_mesh_compression is"),
     ("g['extensionsRequired'] = ['EXT_texture_webp']", "EXT_texture_webp is not supported"),
+    ("g['extensions']['KHR_lights_punctual']['lights'][0]['type'] = 7", "type: must be one of"),
+    ("g['extensions']['KHR_lights_punctual']['lights'] = []", "light: index 0 is out of range"),
     ("g['scene'] = 4", "scene: index 4 is out of range"),
     ("g['scenes'][0]['nodes'] = [0, 99]", "index 99 is out of range"),
     ("g['scenes'][0]['nodes'] = [0, 1]", "nodes[1] is no root"),

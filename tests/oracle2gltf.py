@@ -61,7 +61,8 @@ def cornell(box, wavelength):
     expect = []
     for name, answer in box["reference_mean_irradiance_per_unit_light_exitance"][wavelength].items():
         e = {"quantity": "H", "face": name + " *", "side": "front", "stat": "mean",
-             "value": answer["H"], "rel_tol": .005, "rel_tol_hemicube": .02}
+             "value": answer["H"], "rel_tol_hemicube": .02,
+             "rel_tol": max(.005, 4 * answer["se"] / answer["H"])}  # it is sampled, too
         if name == "escaped_fraction":
             e.update(quantity="escaped_flux", face="*", value=answer["H"] * area)
         expect.append(e)
@@ -82,7 +83,9 @@ def khodulev(oracle):
         faces.append({"name": n, "mat": "wall", "verts": corners})
     expect = []
     for e in oracle["expect"]:
-        e = {**e, "side": "front", "rel_tol_hemicube": max(.01, e["rel_tol"])}
+        # Nothing is said of hemicubes, which are at their worst where faces meet: D, E, F.
+        loose = .1 if half in e.get("offset_from_face_centre", ()) else .01
+        e = {**e, "side": "front", "rel_tol_hemicube": loose}
         if e["quantity"] == "luminance":
             x, y = e["offset_from_face_centre"]
             e.update(quantity="H", stat="point", face="zmin", point=[x, y, -half],

@@ -244,7 +244,8 @@ static void picture_key(const struct trace *t, struct shot *s)
 {
 	const struct view_options *v = &t->view;
 	const double number[] = { s->frame.width, s->frame.height, v->samples, v->lobe_samples,
-		v->depth, v->cutoff, v->layers, t->method, v->gather_rays, v->relative, t->budget, t->exr.compression, t->exr.half };
+		v->depth, v->cutoff, v->layers, t->method, v->gather_rays, v->relative, t->budget,
+		t->exr.compression, t->exr.half };
 	char camera[33];
 	struct digest *d = digest_new();
 
@@ -437,7 +438,8 @@ static int render(const struct trace *t, const struct shot *s, struct err *e)
 	cut_text(&v, cut, sizeof cut);
 	if (!t->cli.quiet)
 		fprintf(t->results, "%s: %s, %d x %d, %" PRIu64 " rays in %.3f s (%.2f Mray/s), "
-		        "written in %.3f s; estimated relative rmse %.2g; %s\n", s->path, s->camera->name, s->frame.width,
+		        "written in %.3f s; estimated relative rmse %.2g; %s\n", s->path,
+		        s->camera->name, s->frame.width,
 		        s->frame.height, v.rays, seconds, (double)v.rays / seconds / 1e6, writing,
 		        v.error, cut);
 	return 0;

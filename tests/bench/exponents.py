@@ -63,7 +63,8 @@ def main():
     for n in EXPONENTS[:-1]:
         truth, error = known.get(float(n), (float("nan"), float("nan")))
         off, view = got[n][0] / mirror - 1, got[n][1] / seen - 1
-        print(f"{n:9} {got[n][0]:10.7f} {truth:10.7f} {100 * (got[n][0] / truth - 1):7.3f}% {100 * error / truth:6.3f}% "
+        print(f"{n:9} {got[n][0]:10.7f} {truth:10.7f} {100 * (got[n][0] / truth - 1):7.3f}% "
+              f"{100 * error / truth:6.3f}% "
               f"{100 * off:12.4f}% {n * off:8.2f} {got[n][1]:10.6f} {100 * view:12.3f}% {n * view:8.2f}")
 
 

@@ -39,8 +39,8 @@ from ff_scenes import make
 SCENES = ["cube16", "cube24", "room", "room-turned", "city100", "city370", "city2100"]
 RUNS = ["-m analytic --to patches", "-m analytic --to patches -t 1e-6", "-m auto --to patches",
         "-m rays -n 4096", "-m rays -n 65536", "-m hemicube -n 64 -p 16"]
-TUNED = {"room": "2e-8", "room-turned": "2e-8", "city100": "2e-5", "city370": "4e-6",
-         "city2100": "2.5e-5"}
+TUNED = {"room": "2e-8", "room-turned": "2e-8", "city100": "2e-5", "city370": "8e-6",
+         "city2100": "6e-5"}
 EXACT, RAYS, ANALYTIC = "exact", "-m rays -n {rays} --seed {seed}", "-m analytic --to patches -t 1e-8"
 BARE_RAYS, MOST = 4_000_000, 6000
 HEAD = ["scene", "patches", "ffcalc", "user", "elapsed", "of bare", "memory", "bytes", "row sums",

@@ -135,15 +135,18 @@ static void print_block_lines(const struct ff_file *ff, char *const *name, uint3
 
 int print_ff_row(const struct ff_file *ff, uint32_t row, struct err *e)
 {
-	static const char *const kind[] = { "diffuse", "emission", "reflected", "transmitted" };
+	static const char *const kind[] = { "diffuse", "emission", "reflected", "transmitted",
+	                                   "light" };
 	const struct ff *f = &ff->f;
+	const uint32_t source = f->row_side[row];
 	char **name = ff_file_side_names(ff, e);
 
 	if (!name)
 		return -1;
 	printf("row       %" PRIu32 "\nfrom      %s\nkind      %s\nsamples   %" PRIu32
 	       "\nscale     %.17g\nresidual  %.17g\nerror     %.17g\n\n", row,
-	       name[f->row_side[row]], kind[f->row_kind[row]], f->row_samples[row],
+	       f->row_kind[row] == FF_LIGHT ? ff->light_name[source - 2 * ff->scene.patches]
+	                                    : name[source], kind[f->row_kind[row]], f->row_samples[row],
 	       f->row_scale[row], (double)f->row_residual[row], (double)f->row_error[row]);
 	printf("chain,to,element,value\n");
 	for (uint64_t b = f->row_block[row]; b < f->row_block[row + 1]; b++)

@@ -23,7 +23,7 @@ VIEW3D = [  # on one core of such a machine, measured before
 def oracles(run):
     """Expected, got and tolerance of every scene with a known answer."""
     run.tell("exact answers")
-    printed, progress = script(ORACLES, "--method", "best", *run.plan.oracles)
+    printed, progress = script(ORACLES, *run.plan.oracles)
     counts = re.search(r"^(\d+) lines, (\d+) FAIL", printed, re.MULTILINE)
     took = {}
     for scene, time in re.findall(r"^oracles: \S+ (\S+) .*?([\d.]+) s$", progress, re.MULTILINE):
@@ -36,8 +36,8 @@ def oracles(run):
                         if counts else "", bool(good) if "--all" in run.plan.oracles else None))
     yield Title("Exact answers")
     yield Words("""`tests/oracles.py` on the scenes of `tests/data/global_illumination.json` and
-        the Cornell box by wavelength; what each is run with is in its table `BEST`.""" +
-                f" Here: `oracles.py --method best {' '.join(run.plan.oracles)}`.")
+        the Cornell box by wavelength; what each is run with is in its tables `CLASSES` and `BEST`.""" +
+                f" Here: `oracles.py {' '.join(run.plan.oracles)}`.")
     yield Listing(printed)
 
 
