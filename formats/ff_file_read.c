@@ -81,7 +81,7 @@ static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
 		{ { &f->link_direction, "link_direction", DT_F32, 2, { f->links, 3 } }, FIELD_EMPTY },
 		{ { &f->link_row, "link_row", DT_U32, 2, { f->links, 2 } }, FIELD_EMPTY },
 		{ { part, "part", DT_U32, 1, { 4 } }, FIELD_NEVER },
-		{ { most, "chain_most", DT_U32, 1, { 1 } }, FIELD_NEVER },
+		{ { most, "chain_most", DT_U32, 1, { 1 } }, FIELD_ZEROS },
 		{ { narrow ? (void *)&f->column16 : (void *)&f->column, "column",
 		  narrow ? DT_U16 : DT_U32, 1, { f->columns } }, FIELD_NEVER },
 		{ { f64 ? (void *)&f->value64 : (void *)&f->value, "value",
@@ -114,7 +114,7 @@ static int map_ff(struct ff_file *o, struct err *e)
 	f->patch_end = part[1];
 	f->part = part[2];
 	f->parts = part[3];
-	f->chain_most = *most;
+	f->chain_most = container_find(c, "chain_most") ? *most : 1;
 	return 0;
 }
 

@@ -334,7 +334,8 @@ static int put_table(struct ff_writer *w, const struct ff *whole, struct err *e)
 	       container_put(c, "chain_start", DT_U64, 1, &starts, whole->chain_start, e) ||
 	       (events && (container_put(c, "chain_event", DT_U32, 1, &events, whole->chain_event, e) ||
 	                   container_put(c, "chain_count", DT_U32, 1, &events, whole->chain_count, e))) ||
-	       container_put(c, "chain_most", DT_U32, 1, &one, &whole->chain_most, e) ||
+	       (whole->chain_most != 1 &&
+	        container_put(c, "chain_most", DT_U32, 1, &one, &whole->chain_most, e)) ||
 	       container_put(c, "part", DT_U32, 1, &four, part, e) ? -1 : 0;
 }
 

@@ -9,7 +9,8 @@
 #include "ff_matrix.h"
 #include "vec3.h"
 
-enum { FORMULA_EVALUATIONS = 1000, FORMULA_BODIES = 8, PATCHES_AT_A_TIME = 64, SOBOL_POINTS_MAX = 1 << 16 };
+enum { FORMULA_EVALUATIONS = 1000, FORMULA_BODIES = 8, PATCHES_AT_A_TIME = 64, SOBOL_POINTS_MAX = 1 << 16,
+       GATHER_FEWEST = 32 };
 
 /* Of what nothing hides, by formula to elements: finer than any picture shows. */
 static const double FORMULA_ERROR = 1e-5;
@@ -122,6 +123,18 @@ static int fill_samples(struct ff_samples *s, uint32_t each, uint64_t n, struct 
 	return s->bits && sample ? 0 : -1;
 }
 
+/* A quarter of the mean area of an element as a picture shows them, each for its area. */
+static double small_area(const struct model *m)
+{
+	double sum = 0, squares = 0;
+
+	for (size_t i = 0; i < m->elements; i++) {
+		sum += m->element_area[i];
+		squares += m->element_area[i] * m->element_area[i];
+	}
+	return squares / (4 * sum);
+}
+
 /* A replicate is whole blocks of the rows' points, an element-side's rays are of the
  * gathering ones. */
 static int make_samples(struct ff_job *j, struct err *e)
@@ -130,8 +143,11 @@ static int make_samples(struct ff_job *j, struct err *e)
 
 	if (j->o.method == FF_HEMICUBE)
 		return 0;
+	if (gather / 4 >= GATHER_FEWEST)
+		j->small_area = small_area(j->m);
 	return fill_samples(&j->of_rows, each, (uint64_t)each * j->o.emitter_gain, e) ||
-	       fill_samples(&j->of_gathering, gather, gather, e) ? -1 : 0;
+	       fill_samples(&j->of_gathering, gather, gather, e) ||
+	       fill_samples(&j->of_small, gather / 4, gather / 4, e) ? -1 : 0;
 }
 
 /* A ray that lands on some sides has more to it than where it lands. */
@@ -177,7 +193,7 @@ static void job_free(struct ff_job *j)
 {
 	void *array[] = { j->element, j->shoots_diffuse, j->shoots_lobe, j->has_lobe,
 		j->is_source, j->emits, j->is_ideal, j->is_black, j->of_rows.bits,
-		j->of_gathering.bits, j->mirror };
+		j->of_gathering.bits, j->of_small.bits, j->mirror };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);

@@ -54,14 +54,15 @@ static void cast(struct gatherer *g, uint32_t column, int thread, uint32_t lost[
 {
 	const struct ff_job *j = g->job;
 	uint64_t seed = rng_mix(rng_mix(j->o.seed + 1) ^ rng_mix(~(uint64_t)column));
-	uint32_t seeds[FF_DIMS], *hits = g->hits[thread];
+	uint32_t seeds[FF_DIMS], *hits = g->hits[thread], rays = ff_gather_rays(j, column >> 1);
+	const struct ff_samples *samples = rays < j->o.gather ? &j->of_small : &j->of_gathering;
 	struct ff_batch_rays b;
 
 	for (int d = 0; d < FF_DIMS; d++)
 		seeds[d] = rng_sobol_seed(seed, d);
-	for (uint32_t first = 0; first < j->o.gather; first += RAY_BATCH) {
-		uint32_t n = j->o.gather - first < RAY_BATCH ? j->o.gather - first : RAY_BATCH;
-		ff_batch_from_element(j, &j->of_gathering, seeds, column, first, n, &b);
+	for (uint32_t first = 0; first < rays; first += RAY_BATCH) {
+		uint32_t n = rays - first < RAY_BATCH ? rays - first : RAY_BATCH;
+		ff_batch_from_element(j, samples, seeds, column, first, n, &b);
 		for (uint32_t i = 0; i < n; i++) {
 			if (b.ray.triangle[i] == RAY_MISS) {
 				lost[0]++;
@@ -80,7 +81,7 @@ static void gather_element(struct gatherer *g, uint32_t patch, uint32_t column, 
 	struct vec *met = &g->met[thread];
 	uint32_t lost[2] = { 0 }, ps = 2 * patch + (column & 1);
 	double part = g->job->m->element_area[column >> 1] /
-	              (g->job->m->patch_area[patch] * g->job->o.gather);
+	              (g->job->m->patch_area[patch] * ff_gather_rays(g->job, column >> 1));
 
 	met->n = 0;
 	cast(g, column, thread, lost);
@@ -113,10 +114,10 @@ static int is_by_formula(const struct ff_job *j, uint32_t ps)
 	return ff_formula_has(&j->formula, ps) && (j->formula.all || j->emits[ps]);
 }
 
-static int takes(const struct ff_job *j, double patch_area, double element_area)
+static int takes(const struct ff_job *j, double patch_area, double element_area, uint32_t rays)
 {
 	return patch_area >= larger * element_area &&
-	       j->o.gather * patch_area >= enough * j->o.rays * element_area;
+	       rays * patch_area >= enough * j->o.rays * element_area;
 }
 
 /* Pairs by receiver, in order, become lists by source, in the same order. */
@@ -164,10 +165,10 @@ static void bound_patches(const struct ff_job *j, double (*centre)[4])
 	}
 }
 
-static int rows_tell_more(const struct ff_job *j)
+static int any_ideal(const struct ff_job *j)
 {
 	for (size_t ps = 0; ps < 2 * j->m->patches; ps++)
-		if (j->is_ideal[ps] || j->has_lobe[ps])
+		if (j->is_ideal[ps])
 			return 1;
 	return 0;
 }
@@ -220,7 +221,7 @@ static int any_takes(const struct ff_job *j)
 			most = fmax(most, j->m->patch_area[ps >> 1]);
 	for (size_t i = 0; i < j->m->elements; i++)
 		least = fmin(least, j->m->element_area[i]);
-	return takes(j, most, least);
+	return takes(j, most, least, j->o.gather);
 }
 
 /* Rows by formula are made of sights too, whatever their sizes. */
@@ -230,6 +231,16 @@ static int any_by_formula(const struct ff_job *j)
 		if (is_by_formula(j, ps))
 			return 1;
 	return 0;
+}
+
+/* That a side of a patch's elements casts. */
+static double patch_rays(const struct ff_job *j, uint32_t patch)
+{
+	double n = 0;
+
+	for (uint32_t i = j->m->patch_start[patch]; i < j->m->patch_start[patch + 1]; i++)
+		n += ff_gather_rays(j, i);
+	return n;
 }
 
 int ff_gather(struct ff_job *j, double *rays, const struct progress *progress, struct err *e)
@@ -245,15 +256,14 @@ int ff_gather(struct ff_job *j, double *rays, const struct progress *progress, s
 	if (!bad) {
 		par_for(j->m->patches, 1, (int)threads, gather_patches, &g, progress);
 		bound_patches(j, j->gather.centre);
-		j->gather.alone = !rows_tell_more(j);
+		j->gather.alone = !any_ideal(j);
 	}
 	for (size_t t = 0; !bad && t < threads; t++)
 		if (g.err[t].set)
 			bad = err_set(e, "%s", g.err[t].text);
 	for (uint32_t ps = 0; !bad && ps < 2 * j->m->patches; ps++)
 		if (!j->is_black[ps] && !j->is_ideal[ps])
-			*rays += (double)(j->m->patch_start[(ps >> 1) + 1] - j->m->patch_start[ps >> 1]) *
-			         j->o.gather;
+			*rays += patch_rays(j, ps >> 1);
 	bad = bad || transpose(&g, e);
 	release(&g, threads);
 	j->gather.rays = bad ? 0 : j->o.gather;
@@ -274,7 +284,8 @@ void ff_gather_free(struct ff_gather *g)
 
 static int element_takes(const struct ff_job *j, uint32_t ps, uint32_t column)
 {
-	return takes(j, j->m->patch_area[ps >> 1], j->m->element_area[column >> 1]);
+	return takes(j, j->m->patch_area[ps >> 1], j->m->element_area[column >> 1],
+	             ff_gather_rays(j, column >> 1));
 }
 
 int ff_row_is_seen(const struct ff_job *j, uint32_t ps)
@@ -289,8 +300,10 @@ int ff_row_is_gathered(const struct ff_job *j, uint32_t ps)
 	const struct ff_gather *g = &j->gather;
 	uint64_t i = g->start[ps], end = g->start[ps + 1];
 
-	if (!g->alone || ff_row_is_seen(j, ps))
-		return g->alone;
+	if (!g->alone || j->has_lobe[ps])
+		return 0;
+	if (ff_row_is_seen(j, ps))
+		return 1;
 	if (i == end)
 		return 0;
 	while (i < end && element_takes(j, ps, g->seen[i].column))
@@ -303,12 +316,14 @@ static double recall(struct ff_thread *t, uint32_t ps)
 {
 	const struct ff_job *j = t->job;
 	const struct ff_gather *g = &j->gather;
-	double sum = 0, scale = 1 / (j->m->patch_area[ps >> 1] * g->rays);
+	double sum = 0;
 
 	t->sights.n = 0;
 	for (uint64_t i = g->start[ps]; i < g->start[ps + 1]; i++) {
-		double n = g->seen[i].count, one = scale * j->m->element_area[g->seen[i].column >> 1];
-		struct ff_sight s = { g->seen[i].column, one * n, one * one * n * (1 - n / g->rays) };
+		uint32_t element = g->seen[i].column >> 1;
+		double n = g->seen[i].count, rays = ff_gather_rays(j, element);
+		double one = j->m->element_area[element] / (j->m->patch_area[ps >> 1] * rays);
+		struct ff_sight s = { g->seen[i].column, one * n, one * one * n * (1 - n / rays) };
 		if (!element_takes(j, ps, s.column))
 			continue;
 		if (vec_append(&t->sights, &s, 1, sizeof s, &t->tally.err))
@@ -412,9 +427,8 @@ static void book_lost(struct ff_thread *t, uint32_t ps, double lost)
 static double landing(const struct ff_thread *t, uint32_t ps, uint32_t cast, double *rays)
 {
 	const struct ff_job *j = t->job;
-	const uint32_t *start = &j->m->patch_start[ps >> 1];
 
-	*rays = cast ? cast : (double)j->gather.rays * (start[1] - start[0]);
+	*rays = cast ? cast : patch_rays(j, ps >> 1);
 	return cast ? brought(t, ps, cast) : 1 - j->gather.escape[ps] - j->gather.black[ps];
 }
 

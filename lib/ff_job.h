@@ -38,7 +38,7 @@ struct ff_gathered {
 
 struct ff_gather {
 	uint32_t rays;            /* from an element-side; 0: nothing was gathered */
-	int alone;                /* rows tell of nothing but diffuse landings */
+	int alone;                /* no ideal surfaces: all that rows tell is where rays land */
 	uint64_t *start;          /* [2P+1] of a patch-side, ordered by place */
 	struct ff_gathered *seen;
 	double (*centre)[4];      /* [P] of a patch, and the distance of its farthest vertex */
@@ -73,7 +73,9 @@ struct ff_job {
 	int has_panes, has_ideal; /* any clear pane; any ideal surface */
 	struct ff_mirror *mirror; /* [mirrors] planes with images of lights; none if they are */
 	size_t mirrors;           /* so many that only rays will do */
-	struct ff_samples of_rows, of_gathering;
+	double small_area;        /* elements below gather with a quarter of the rays: what they
+	                             lack weighs little */
+	struct ff_samples of_rows, of_gathering, of_small;
 	struct tally_places places;
 	struct ff_gather gather;
 	struct ff_formula formula;
@@ -186,7 +188,13 @@ void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], do
 /* The same for a ray of chain 0 whose first landing has been tallied already. */
 void ff_follow_on(struct ff_thread *t, const double org[3], const double dir[3], double w);
 
-/* Casts o.gather rays from every element-side that is modelled and no ideal mirror or
+/* How many rays each side of an element gathers with. */
+static inline uint32_t ff_gather_rays(const struct ff_job *j, uint32_t element)
+{
+	return j->m->element_area[element] < j->small_area ? j->o.gather / 4 : j->o.gather;
+}
+
+/* Casts ff_gather_rays rays from every element-side that is modelled and no ideal mirror or
  * pane, jointly stratified over its area and hemisphere, into j->gather; adds to *rays.
  * Memory: 16 bytes for every pair of an element-side and a patch-side that it sees.
  * O(element-sides x rays x log triangles). 0, or -1 and e. */

@@ -73,33 +73,36 @@ class Run:
             yield thing
 
 
-def blocks_of(run, names):
-    """Of all sections; one that fails says so."""
-    blocks, failed = [], []
-    for name in names:
+def head(run, begun, whole):
+    """The bars, and what it all ran on."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    took = f"{run.minutes():.1f} minutes, {used.ru_utime + used.ru_stime:.0f} processor seconds"
+    whole = Bar("this report", f"≤ {MINUTES} minutes on two processors", took,
+                run.minutes() <= MINUTES if whole and run.plan is PLAN else None)
+    about = machine() + [("load", f"{begun:.1f} processes at the start, {load():.1f} at the end; this "
+                                  "report makes it about 2"),
+                         ("took", took)]
+    yield Words(run.plan.about)
+    yield page.bars_table(run.bars + [whole])
+    yield Title("The machine")
+    yield page.Table("", ["", ""], [list(pair) for pair in about], left=2)
+    yield Words("""Other programs on the machine make processor seconds longer, too, up to twice
+        where two threads share a core: trust ratios rather than seconds.""")
+
+
+def write(run, names):
+    """The page, anew after each section; one that fails says so. Names of those."""
+    begun, blocks, failed = load(), [], []
+    for i, name in enumerate(names):
         try:
             blocks += SECTIONS[name](run)
         except Failed as e:
             print(f"report: {name}: {e}", file=sys.stderr)
             failed.append(name)
             blocks += [Title(name), Words(f"Could not be measured: {e}")]
-    return blocks, failed
-
-
-def head(run, begun):
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    took = f"{run.minutes():.1f} minutes, {used.ru_utime + used.ru_stime:.0f} processor seconds"
-    run.bars.append(Bar("this report", f"≤ {MINUTES} minutes on two processors", took,
-                        run.minutes() <= MINUTES if run.plan is PLAN else None))
-    about = machine() + [("load", f"{begun:.1f} processes at the start, {load():.1f} at the end; this "
-                                  "report makes it about 2"),
-                         ("took", took)]
-    yield Words(run.plan.about)
-    yield page.bars_table(run.bars)
-    yield Title("The machine")
-    yield page.Table("", ["", ""], [list(pair) for pair in about], left=2)
-    yield Words("""Other programs on the machine make processor seconds longer, too, up to twice
-        where two threads share a core: trust ratios rather than seconds.""")
+        whole = len(names) == len(SECTIONS) == i + 1
+        page.write(run.out, "twopass: speed and accuracy", [*head(run, begun, whole), *blocks])
+    return failed
 
 
 def arguments():
@@ -118,10 +121,8 @@ def main():
     o = arguments()
     work = o.work or tempfile.mkdtemp(prefix="twopass-report.")
     run = Run(FULL if o.full else QUICK if o.quick else PLAN, o.out, work)
-    begun = load()
     try:
-        blocks, failed = blocks_of(run, o.only or list(SECTIONS))
-        page.write(o.out, "twopass: speed and accuracy", [*head(run, begun), *blocks])
+        failed = write(run, o.only or list(SECTIONS))
     except Failed as e:
         sys.exit(f"report: {e}")
     finally:

@@ -13,10 +13,10 @@ from speed import percent, seconds
 DEFAULT = Solution("defaults")
 WAYS = ["-d mesh", "-d direct", "-d gather"]
 TRACED = [  # options of trace for each solution
-    (Solution("`ffcalc -n 1024`", ffcalc=["-n", 1024]), WAYS),
+    (Solution("`mesh -e 5% -p 7%`, `ffcalc -n 1024`", ["-e", "5%", "-p", "7%"], ["-n", 1024]), WAYS),
     (DEFAULT, WAYS + ["-d gather --gather-rays 256", "-d gather --gather-rays 2048"]),
     (Solution("`mesh -e 3%`", ["-e", "3%"]), WAYS),
-    (Solution("`mesh -e 2%`", ["-e", "2%"]), WAYS),
+    (Solution("`mesh -e 3%`, `ffcalc -n 16384`", ["-e", "3%"], ["-n", 16384]), WAYS),
     (Solution("`mesh -e 2%`, `ffcalc -n 16384`", ["-e", "2%"], ["-n", 16384]), WAYS),
     (Solution("`mesh --refine` once", refined=1), WAYS)]
 CENTRES = ["--samples", 1]
@@ -62,14 +62,19 @@ def method(view):
     return words[words.index("-d") + 1] if "-d" in words else "mesh"
 
 
-def chosen(views, error, cost):
-    """The cheapest view that is good enough, else the best one."""
-    good = [v for v in views if v.errors.rmse <= error]
-    return min(good, key=cost) if good else min(views, key=lambda v: v.errors.rmse, default=None)
+def chosen(views, error, limit, cost):
+    """The best view within the limit of cost; if that is not good enough, the cheapest that
+    is, else the best."""
+    rmse = lambda v: v.errors.rmse
+    within = min((v for v in views if cost(v) <= limit), key=rmse, default=None)
+    if within and rmse(within) <= error:
+        return within
+    best = min(views, key=rmse, default=None)
+    return min((v for v in views if rmse(v) <= error), key=cost, default=best)
 
 
 def bar_of(what, views, error, limit, cost):
-    v = chosen(views, error, cost)
+    v = chosen(views, error, limit, cost)
     bar = f"{100 * error:g} % in ≤ {limit:g} s"
     if not v:
         return Bar(what, bar, "", None), None
