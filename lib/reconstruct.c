@@ -45,15 +45,19 @@ struct job {
 	const struct model *m;
 	const struct solution *s;
 	struct smooth_groups g;
-	double *h;                /* [2 elements][bands] */
-	double *value;            /* [groups][2 sides][bands] at the vertices */
-	double *rest;             /* [2 elements][bands] what their means still miss */
-	double *shift;            /* [groups][2 sides][bands] */
+	int columns;              /* bands, twice where light straight from emitters and other
+	                             light are interpolated apart: one has edges and little
+	                             noise, the other noise and few edges */
+	double *h;                /* [2 elements][columns] */
+	double *error;            /* of them, or NULL */
+	double *value;            /* [groups][2 sides][columns] at the vertices */
+	double *rest;             /* [2 elements][columns] what their means still miss */
+	double *shift;            /* [groups][2 sides][columns] */
 	struct reconstruction *out;
 	struct scratch *scratch;  /* one a thread */
 };
 
-/* What one channel (side and band) of a list of elements looks like to a fit. */
+/* What one channel (side and column) of a list of elements looks like to a fit. */
 struct channel {
 	double value;             /* of the fit at the vertex */
 	double gx, gy, mean;
@@ -63,7 +67,7 @@ struct channel {
 
 static double at(const struct job *j, uint32_t element, size_t channel)
 {
-	return j->h[2 * (size_t)element * (size_t)j->s->bands + channel];
+	return j->h[2 * (size_t)element * (size_t)j->columns + channel];
 }
 
 /* Area-weighted normal of the group; 0 when it has none to speak of. */
@@ -215,14 +219,14 @@ static double clamped(const struct channel *c)
 static double consistency(const struct job *j, const struct scratch *s,
                           const struct fit *f, const struct channel *c, size_t channel)
 {
-	size_t sides = 2 * (size_t)j->s->bands;
+	size_t channels = 2 * (size_t)j->columns;
 	double chi2 = 0;
 
 	if (f->n <= 3)
 		return 0;
 	for (size_t i = 0; i < f->n; i++) {
 		const struct near *p = &s->near[i];
-		double error = j->s->error[p->element * sides + channel];
+		double error = j->error[p->element * channels + channel];
 		double d = at(j, p->element, channel) - c->mean - c->gx * (p->x - f->mx) -
 		           c->gy * (p->y - f->my);
 		if (d == 0)
@@ -236,9 +240,9 @@ static double consistency(const struct job *j, const struct scratch *s,
 
 /* Area-weighted mean of the elements at the vertex: what is left without a fit. */
 static void average(const struct job *j, const struct scratch *s, size_t n, double sum,
-                    double *value)
+                    size_t channels, double *value)
 {
-	for (size_t c = 0; c < 2 * (size_t)j->s->bands; c++) {
+	for (size_t c = 0; c < channels; c++) {
 		value[c] = 0;
 		for (size_t i = 0; i < n; i++)
 			value[c] += (sum > 0 ? s->near[i].w : 1. / (double)n) *
@@ -249,9 +253,11 @@ static void average(const struct job *j, const struct scratch *s, size_t n, doub
 /* Values at the vertex of a group. */
 static void solve_group(const struct job *j, struct scratch *s, size_t group)
 {
-	size_t channels = 2 * (size_t)j->s->bands, begin = 0;
-	double *value = j->value + group * channels;
-	uint32_t vertex = j->m->element[j->g.corner[j->g.start[group]]];
+	uint32_t corner = j->g.corner[j->g.start[group]], vertex = j->m->element[corner];
+	uint32_t side = 2 * j->m->element_patch[corner / 3];
+	size_t sides = model_side_modelled(j->m, side + BACK) ? 2 : 1, begin = 0;
+	size_t channels = sides * (size_t)j->columns;
+	double *value = j->value + 2 * group * (size_t)j->columns;
 	struct fit f = { 0 };
 	double normal[3];
 	int facing = group_normal(j, group, normal);
@@ -259,7 +265,7 @@ static void solve_group(const struct job *j, struct scratch *s, size_t group)
 	list_group(j, s, group, &f.n);
 	f.ring1 = f.n;
 	double sum = place(j, s, f.n, vertex, normal);
-	average(j, s, f.n, sum, value);
+	average(j, s, f.n, sum, channels, value);
 	if (!facing)
 		return;
 	prepare(s, &f);
@@ -269,7 +275,7 @@ static void solve_group(const struct job *j, struct scratch *s, size_t group)
 			struct channel t = fit_channel(j, s, &f, c);
 			value[c] = clamped(&t);
 		}
-		if (good && !j->s->error)
+		if (good && !j->error)
 			return;
 		size_t more = add_ring(j, s, group, normal, begin, f.n);
 		begin = f.n;
@@ -305,7 +311,7 @@ static void solve_groups(void *arg, size_t begin, size_t end, int thread)
 static double corner_mean(const struct job *j, const double *at_groups, size_t element,
                           size_t channel)
 {
-	size_t channels = 2 * (size_t)j->s->bands;
+	size_t channels = 2 * (size_t)j->columns;
 	const uint32_t *g = &j->g.group[3 * element];
 
 	return (at_groups[g[0] * channels + channel] + at_groups[g[1] * channels + channel] +
@@ -315,7 +321,7 @@ static double corner_mean(const struct job *j, const double *at_groups, size_t e
 static void find_rest(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct job *j = arg;
-	size_t channels = 2 * (size_t)j->s->bands;
+	size_t channels = 2 * (size_t)j->columns;
 
 	(void)thread;
 	for (size_t e = begin; e < end; e++)
@@ -327,7 +333,7 @@ static void find_rest(void *arg, size_t begin, size_t end, int thread)
 static void spread_to_elements(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct job *j = arg;
-	size_t channels = 2 * (size_t)j->s->bands;
+	size_t channels = 2 * (size_t)j->columns;
 
 	(void)thread;
 	for (size_t e = begin; e < end; e++)
@@ -338,7 +344,7 @@ static void spread_to_elements(void *arg, size_t begin, size_t end, int thread)
 static void spread_to_groups(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct job *j = arg;
-	size_t channels = 2 * (size_t)j->s->bands;
+	size_t channels = 2 * (size_t)j->columns;
 
 	(void)thread;
 	for (size_t g = begin; g < end; g++) {
@@ -361,11 +367,12 @@ static void spread_to_groups(void *arg, size_t begin, size_t end, int thread)
 static void store_groups(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct job *j = arg;
-	size_t channels = 2 * (size_t)j->s->bands;
+	size_t channels = 2 * (size_t)j->columns, bands = (size_t)j->s->bands;
 
 	(void)thread;
 	for (size_t g = begin; g < end; g++)
 		for (size_t c = 0; c < channels; c++) {
+			size_t to = c / (size_t)j->columns * bands + c % bands;
 			double value = j->value[g * channels + c], low = value, high = value;
 			for (uint32_t i = j->g.start[g]; i < j->g.start[g + 1]; i++) {
 				low = fmin(low, at(j, j->g.corner[i] / 3, c));
@@ -373,7 +380,7 @@ static void store_groups(void *arg, size_t begin, size_t end, int thread)
 			}
 			value = fmin(fmax(value + j->shift[g * channels + c], low), high);
 			for (uint32_t i = j->g.start[g]; i < j->g.start[g + 1]; i++)
-				j->out->corner[j->g.corner[i] * channels + c] = (float)value;
+				j->out->corner[j->g.corner[i] * 2 * bands + to] += (float)value;
 		}
 }
 
@@ -391,25 +398,56 @@ static void run(struct job *j, int threads)
 	par_for(j->g.groups, CHUNK, threads, store_groups, j, NULL);
 }
 
-static int sum_parts(struct job *j, unsigned parts, struct err *e)
+/* Adds a part of the irradiance to a column of the bands. */
+static void add_part(struct job *j, const double *part, size_t column)
 {
 	const struct solution *s = j->s;
-	const double *part[] = { s->direct, s->caustic, s->indirect };
-	size_t n = s->element_sides * (size_t)s->bands;
+	size_t bands = (size_t)s->bands, n = s->element_sides * bands;
 
-	j->h = mem_new(n, sizeof *j->h, "irradiance", e);
-	if (!j->h)
+	for (size_t i = 0; i < s->groups * n; i++)
+		j->h[i % n / bands * (size_t)j->columns + column * bands + i % bands] += part[i];
+}
+
+/* Standard errors of the columns: of all, if that is all that is known. */
+static void set_errors(struct job *j, unsigned parts)
+{
+	const struct solution *s = j->s;
+	size_t bands = (size_t)s->bands;
+
+	for (size_t i = 0; i < s->element_sides * bands; i++) {
+		double *to = &j->error[i / bands * (size_t)j->columns + i % bands];
+		double all = s->error[i], direct = s->error_direct ? s->error_direct[i] : all;
+		double other = s->error_direct ? sqrt(fmax(0, all * all - direct * direct)) : all;
+		if ((size_t)j->columns > bands)
+			to[bands] = other;
+		*to = parts & PART_DIRECT ? direct : other;
+	}
+}
+
+static int set_columns(struct job *j, unsigned parts, struct err *e)
+{
+	const struct solution *s = j->s;
+	int apart = parts & PART_DIRECT && parts != PART_DIRECT && s->error && s->error_direct;
+
+	j->columns = s->bands * (1 + apart);
+	j->h = mem_new(s->element_sides, (size_t)j->columns * sizeof *j->h, "irradiance", e);
+	if (!j->h || (s->error && !(j->error = mem_new(s->element_sides, (size_t)j->columns *
+	                                               sizeof *j->error, "irradiance", e))))
 		return -1;
-	for (size_t g = 0; g < s->groups; g++)
-		for (int p = 0; p < 3; p++)
-			for (size_t i = 0; i < n && (parts >> p & 1); i++)
-				j->h[i] += part[p][g * n + i];
+	if (parts & PART_DIRECT)
+		add_part(j, s->direct, 0);
+	if (parts & PART_CAUSTIC)
+		add_part(j, s->caustic, (size_t)apart);
+	if (parts & PART_INDIRECT)
+		add_part(j, s->indirect, (size_t)apart);
+	if (s->error)
+		set_errors(j, parts);
 	return 0;
 }
 
 static int new_values(struct job *j, struct err *e)
 {
-	size_t bytes = 2 * (size_t)j->s->bands * sizeof(double);
+	size_t bytes = 2 * (size_t)j->columns * sizeof(double);
 
 	j->value = mem_new(j->g.groups, bytes, "irradiance at vertices", e);
 	j->shift = mem_new(j->g.groups, bytes, "irradiance at vertices", e);
@@ -443,6 +481,7 @@ static void free_job(struct job *j, int threads)
 	}
 	free(j->scratch);
 	free(j->h);
+	free(j->error);
 	free(j->value);
 	free(j->rest);
 	free(j->shift);
@@ -462,7 +501,7 @@ int reconstruct(const struct model *m, const struct solution *s, unsigned parts,
 	if (m->elements <= SIZE_MAX / (6 * BANDS_MAX))
 		r->corner = mem_new(m->elements * 6 * (size_t)s->bands, sizeof *r->corner,
 		                    "irradiance at corners", e);
-	if (r->corner && !sum_parts(&j, parts, e) && !smooth_groups_new(m, COS_CREASE, &j.g, e) &&
+	if (r->corner && !set_columns(&j, parts, e) && !smooth_groups_new(m, COS_CREASE, &j.g, e) &&
 	    !new_values(&j, e) && !new_scratch(&j, threads, e)) {
 		run(&j, threads);
 		bad = 0;
