@@ -13,7 +13,7 @@
  * else of the same input and options, so that what older programs left is made anew. */
 #define REVISION_MESH "3"
 #define REVISION_FF "8"
-#define REVISION_RAD "8"
+#define REVISION_RAD "9"
 #define REVISION_VIEW "4"
 
 /* Strings are owned (malloc) and may be NULL. */

@@ -162,7 +162,6 @@ static int is_slow(struct solver *v, double unshot, double stop)
 	return stop > 0 && log(unshot / stop) > WORTH * rate;
 }
 
-
 static void tell(const struct solver *v, const struct radiosity_hooks *hooks,
                  const struct radiosity_report *r)
 {
