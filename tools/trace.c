@@ -34,7 +34,7 @@ static const struct cli_option option_table[] = {
 	{ OPT_TARGET, "target", "X,Y,Z", "point it looks at" },
 	{ OPT_UP, "up", "X,Y,Z", "its upright direction (default: 0,1,0)" },
 	{ OPT_FOV, "fov", "DEGREES", "its vertical field of view (default: 50)" },
-	{ 'd', "diffuse", "METHOD", "where diffuse light comes from: mesh (default), direct, gather" },
+	{ 'd', "diffuse", "METHOD", "where diffuse light comes from: mesh, direct (default), gather" },
 	{ 't', "error", "X", "relative standard error of pixels at which sampling stops" },
 	{ OPT_BUDGET, "budget", "SECONDS", "as many samples and rays as fit in, for each picture" },
 	{ OPT_SAMPLES, "samples", "N", "positions in each pixel (default: 4; 1: its centre)" },
@@ -493,6 +493,7 @@ int main(int argc, char **argv)
 		.cli = { .program = "trace", .synopsis = "[options] FILE.rad -o PICTURE.exr",
 		         .about = "Render views of a solved scene, following mirrors and panes.",
 		         .options = option_table, .uses_threads = 1 },
+		.method = VIEW_DIRECT,
 		.view = { .depth = 32, .cutoff = 1e-3 }
 	};
 	struct err e = { 0 };
