@@ -17,7 +17,7 @@
  * lobe: as in adapt_patches.c. */
 static const double arriving = .1;
 
-/* Of the mean deviation of patch-sides, what is still worth a look at all lobes. */
+/* Of the mean over patch-sides, the least deviation that is worth a look at all lobes. */
 static const double notable = 1e-3;
 
 /* A patch-side with a lobe for light that arrives there. */
@@ -54,8 +54,8 @@ static int add_shiny(const struct model *m, uint32_t ps, struct vec *list, struc
 	return x.share[0] + x.share[1] > 0 ? vec_append(list, &x, 1, sizeof x, e) : 0;
 }
 
-/* The part of the light of patch-side q that the lobes of x smear, as if nothing stood
- * between: the form factor, of a disc as large as x, times k s^2/(12 d^2). */
+/* The part of the squared deviations of patch-side q that the lobes of x make an error, as if
+ * nothing stood between: the form factor, of a disc as large as x, times k s^2/(12 d^2). */
 static double smeared(const struct model *m, const struct patch_frame *frame, uint32_t q,
                       const struct shiny *x)
 {
