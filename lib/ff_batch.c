@@ -89,7 +89,7 @@ static int sort_links(struct ff_batch *b, struct err *e)
 	if (!l)
 		return -1;
 	for (size_t i = 0; i < n; i++) {
-		l[i] = (struct link){ target[i], source[i], last[i], chain[i],
+		l[i] = (struct link_key){ target[i], source[i], last[i], chain[i],
 		                      { row[2 * i], row[2 * i + 1] }, (uint32_t)i, { 0 } };
 		memcpy(l[i].direction, &direction[3 * i], sizeof l[i].direction);
 	}
