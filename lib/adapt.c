@@ -33,6 +33,7 @@ struct plan {
 	const struct model *m;
 	double *energy;       /* [elements] */
 	double *patch_energy; /* [patches] what they cost others */
+	double *lobe_energy;  /* [patches] of that, what they cost by lobes */
 	uint8_t *most;        /* [elements] halvings that the least size leaves room for */
 	uint8_t *halvings;    /* [elements] that a bound leads to, and of patches */
 	uint8_t *patch_halvings;
@@ -91,8 +92,11 @@ static double find_energies(struct plan *p, const struct solution *s)
 	double mean = area > 0 ? sum / area / m->bands : 0;
 	for (size_t i = 0; i < m->elements; i++)
 		p->energy[i] = mean > 0 ? p->energy[i] / (mean * mean) : 0;
-	for (size_t i = 0; i < m->patches; i++)
-		p->patch_energy[i] = mean > 0 ? p->patch_energy[i] / (mean * mean) : 0;
+	for (size_t i = 0; i < m->patches; i++) {
+		p->lobe_energy[i] = mean > 0 ? p->lobe_energy[i] / (mean * mean) : 0;
+		p->patch_energy[i] = p->lobe_energy[i] +
+		                     (mean > 0 ? p->patch_energy[i] / (mean * mean) : 0);
+	}
 	return area * m->bands;
 }
 
@@ -197,6 +201,39 @@ static double total(const double *energy, size_t n)
 	return sum;
 }
 
+static int find_patch_energies(struct plan *p, const struct solution *s, struct err *e)
+{
+	struct patch_frame *frame = patch_frames(p->m, e);
+	int status = frame && !patch_energies(p->m, s, frame, p->patch_energy, e) &&
+	             !lobe_energies(p->m, s, frame, p->lobe_energy, e) ? 0 : -1;
+
+	free(frame);
+	return status;
+}
+
+static int allocate(struct plan *p, struct err *e)
+{
+	const struct model *m = p->m;
+
+	p->energy = mem_new(m->elements, sizeof *p->energy, "errors of elements", e);
+	p->patch_energy = mem_new(m->patches, sizeof *p->patch_energy, "errors of patches", e);
+	p->lobe_energy = mem_new(m->patches, sizeof *p->lobe_energy, "errors of patches", e);
+	p->most = mem_new(m->elements, sizeof *p->most, "errors of elements", e);
+	return p->energy && p->patch_energy && p->lobe_energy && p->most ? 0 : -1;
+}
+
+/* What is more than the bound. Of a patch the larger part of its energy is the reason. */
+static void count_marked(const struct plan *p, double bound, struct mesher_report *r)
+{
+	for (size_t i = 0; i < p->m->elements; i++)
+		r->marked += p->energy[i] > bound && p->most[i] > 0;
+	for (size_t i = 0; i < p->m->patches; i++) {
+		r->patches_marked += p->patch_energy[i] > bound;
+		r->patches_for_lobes += p->patch_energy[i] > bound &&
+		                        p->lobe_energy[i] > .5 * p->patch_energy[i];
+	}
+}
+
 int adapt_plan(const struct model *m, const struct solution *s, const struct mesher_refinement *o,
                double smallest, uint8_t *halving, uint8_t *patch_halving,
                struct mesher_report *r, struct err *e)
@@ -205,11 +242,7 @@ int adapt_plan(const struct model *m, const struct solution *s, const struct mes
 		          .patch_halvings = patch_halving };
 	size_t elements;
 
-	p.energy = mem_new(m->elements, sizeof *p.energy, "errors of elements", e);
-	p.patch_energy = mem_new(m->patches, sizeof *p.patch_energy, "errors of patches", e);
-	p.most = mem_new(m->elements, sizeof *p.most, "errors of elements", e);
-	int status = p.energy && p.patch_energy && p.most &&
-	             !patch_energies(m, s, p.patch_energy, e) ? 0 : -1;
+	int status = allocate(&p, e) || find_patch_energies(&p, s, e) ? -1 : 0;
 	if (!status) {
 		double unit = find_energies(&p, s);
 		find_room(&p, smallest);
@@ -218,10 +251,7 @@ int adapt_plan(const struct model *m, const struct solution *s, const struct mes
 		p.allowed = fmax(o->error * o->error * unit, once * (own + others));
 		double bound = own + others <= p.allowed ? INFINITY : find_bound(&p);
 		double expected = expect(&p, bound, &elements);
-		for (size_t i = 0; i < m->elements; i++)
-			r->marked += p.energy[i] > bound && p.most[i] > 0;
-		for (size_t i = 0; i < m->patches; i++)
-			r->patches_marked += p.patch_energy[i] > bound;
+		count_marked(&p, bound, r);
 		if (unit > 0) {
 			r->error_before = sqrt((own + others) / unit);
 			r->patch_error_before = sqrt(others / unit);
@@ -230,6 +260,7 @@ int adapt_plan(const struct model *m, const struct solution *s, const struct mes
 	}
 	free(p.energy);
 	free(p.patch_energy);
+	free(p.lobe_energy);
 	free(p.most);
 	return status;
 }

@@ -22,11 +22,28 @@ struct search {
 	struct boxes boxes;
 	double *corner;       /* [2 patches][3] of boxes */
 	uint32_t *triangle;   /* [patches][3] that have these boxes */
-	double (*normal)[3];  /* [patches] mean */
-	double (*centre)[3];
+	const struct patch_frame *frame;
 	struct vec found;
 	struct err *e;
 };
+
+struct patch_frame *patch_frames(const struct model *m, struct err *e)
+{
+	struct patch_frame *frame = mem_new(m->patches, sizeof *frame, "patches", e);
+
+	for (uint32_t i = 0; frame && i < m->elements; i++) {
+		uint32_t p = m->element_patch[i];
+		double part = m->element_area[i] / (3 * m->patch_area[p]);
+		for (size_t k = 0; k < 3; k++)
+			v3_mad(frame[p].centre, part, &m->vertex[3 * (size_t)m->element[3 * i + k]],
+			       frame[p].centre);
+		v3_mad(frame[p].normal, m->element_area[i], &m->element_normal[3 * (size_t)i],
+		       frame[p].normal);
+	}
+	for (uint32_t p = 0; frame && p < m->patches; p++)
+		v3_normalise(frame[p].normal);
+	return frame;
+}
 
 static int prepare(struct search *s)
 {
@@ -34,9 +51,7 @@ static int prepare(struct search *s)
 
 	s->corner = mem_new(m->patches, 6 * sizeof *s->corner, "patches", s->e);
 	s->triangle = mem_new(m->patches, 3 * sizeof *s->triangle, "patches", s->e);
-	s->normal = mem_new(m->patches, sizeof *s->normal, "patches", s->e);
-	s->centre = mem_new(m->patches, sizeof *s->centre, "patches", s->e);
-	if (!s->corner || !s->triangle || !s->normal || !s->centre)
+	if (!s->corner || !s->triangle)
 		return -1;
 	for (uint32_t p = 0; p < m->patches; p++) {
 		double *lo = &s->corner[6 * (size_t)p], *hi = lo + 3;
@@ -49,12 +64,7 @@ static int prepare(struct search *s)
 				double x = m->vertex[3 * (size_t)m->element[i] + k];
 				lo[k] = fmin(lo[k], x);
 				hi[k] = fmax(hi[k], x);
-				s->centre[p][k] += m->element_area[i / 3] * x / (3 * m->patch_area[p]);
 			}
-		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++)
-			v3_mad(s->normal[p], m->element_area[i], &m->element_normal[3 * (size_t)i],
-			       s->normal[p]);
-		v3_normalise(s->normal[p]);
 	}
 	return boxes_build(&s->boxes, s->corner, s->triangle, m->patches, s->e);
 }
@@ -70,17 +80,16 @@ static int is_close(struct search *s, uint32_t p, int side)
 		return -1;
 	const uint32_t *q = s->found.data;
 	for (size_t i = 0; i < s->found.n; i++) {
-		v3_sub(s->centre[q[i]], s->centre[p], d);
-		if (fabs(v3_dot(s->normal[p], s->normal[q[i]])) < .9 &&
-		    sign * v3_dot(s->normal[p], d) > .1 * v3_length(d))
+		const struct patch_frame *here = &s->frame[p], *there = &s->frame[q[i]];
+		v3_sub(there->centre, here->centre, d);
+		if (fabs(v3_dot(here->normal, there->normal)) < .9 &&
+		    sign * v3_dot(here->normal, d) > .1 * v3_length(d))
 			return 1;
 	}
 	return 0;
 }
 
-/* Sum over a patch-side of squared deviations from its mean exitance, less what noise there
- * is in them. */
-static double deviations(const struct model *m, const struct solution *s, uint32_t p, int side)
+double patch_deviations(const struct model *m, const struct solution *s, uint32_t p, int side)
 {
 	const struct materials *mt = &m->material;
 	size_t here = material_at(mt, model_patch_material(m, p), side), bands = (size_t)m->bands;
@@ -101,22 +110,20 @@ static double deviations(const struct model *m, const struct solution *s, uint32
 	return all;
 }
 
-int patch_energies(const struct model *m, const struct solution *s, double *energy,
-                   struct err *e)
+int patch_energies(const struct model *m, const struct solution *s,
+                   const struct patch_frame *frame, double *energy, struct err *e)
 {
-	struct search search = { .m = m, .e = e };
+	struct search search = { .m = m, .frame = frame, .e = e };
 	int status = prepare(&search);
 
 	for (uint32_t ps = 0; !status && ps < 2 * m->patches; ps++) {
 		int close = model_side_modelled(m, ps) ? is_close(&search, ps >> 1, (int)(ps & 1)) : 0;
 		status = close < 0 ? -1 : 0;
 		if (close > 0)
-			energy[ps >> 1] += arriving * deviations(m, s, ps >> 1, (int)(ps & 1));
+			energy[ps >> 1] += arriving * patch_deviations(m, s, ps >> 1, (int)(ps & 1));
 	}
 	free(search.corner);
 	free(search.triangle);
-	free(search.normal);
-	free(search.centre);
 	free(search.found.data);
 	boxes_free(&search.boxes);
 	return status;

@@ -65,6 +65,7 @@ struct mesher_report {
 	/* Of mesher_refine. Errors as in struct mesher_refinement. */
 	size_t elements_before, patches_before;
 	size_t marked, patches_marked;   /* to be divided for their own sake */
+	size_t patches_for_lobes;        /* of these, for what lobes light */
 	double error_before, error_expected;
 	double patch_error_before;       /* the part of patches in error_before */
 
@@ -86,9 +87,10 @@ int mesher_run(struct model *m, const struct mesher_options *o, struct mesher_re
 /* The same from an earlier mesh and its solution: `old` becomes the division of m, with
  * those elements halved that contribute most to the error that s states (s->discretisation),
  * and those patches whose exitance differs too much from place to place for what is next to
- * them. Other patches stay as they were. m may have other materials and cameras than old, but its
- * triangles, cleaned and cut as o says, must be the same. (*origin)[e] = element of old that
- * element e is part of, to be freed in any case. old is used up. */
+ * them, or for lobes that mirror them. Other patches stay as they were. m may have other
+ * materials and cameras than old, but its triangles, cleaned and cut as o says, must be the
+ * same. (*origin)[e] = element of old that element e is part of, to be freed in any case. old
+ * is used up. */
 int mesher_refine(struct model *m, const struct mesher_options *o, struct model *old,
                   const struct solution *s, const struct mesher_refinement *how,
                   uint32_t **origin, struct mesher_report *r, struct err *e);

@@ -88,11 +88,29 @@ int adapt_plan(const struct model *m, const struct solution *s,
                const struct mesher_refinement *how, double smallest, uint8_t *halvings,
                uint8_t *patch_halvings, struct mesher_report *r, struct err *e);
 
-/* adapt_patches.c: adds to energy[patches] what the differences of exitance within a patch,
- * which it shoots as if there were none, cost the surfaces next to it: in the square of
- * exitance times area, summed over bands. 0, or -1 and e. */
-int patch_energies(const struct model *m, const struct solution *s, double *energy,
-                   struct err *e);
+/* adapt_patches.c: the centroid of a patch and its mean front normal, unit. */
+struct patch_frame {
+	double centre[3], normal[3];
+};
+
+/* [patches], to be freed; NULL and e on failure. O(elements). */
+struct patch_frame *patch_frames(const struct model *m, struct err *e);
+
+/* Sum over a patch-side and over bands of squared deviations of its exitance from its mean,
+ * less what noise there is in them: in the square of exitance times area. */
+double patch_deviations(const struct model *m, const struct solution *s, uint32_t patch,
+                        int side);
+
+/* Adds to energy[patches] what the differences of exitance within a patch, which it shoots as
+ * if there were none, cost the surfaces next to it: in units of patch_deviations. 0, or -1
+ * and e. */
+int patch_energies(const struct model *m, const struct solution *s,
+                   const struct patch_frame *frame, double *energy, struct err *e);
+
+/* adapt_lobes.c: the same of what lobes of finite exponents light: they mirror a patch as if
+ * its exitance were everywhere the same. O(uneven patch-sides x patch-sides with lobes). */
+int lobe_energies(const struct model *m, const struct solution *s,
+                  const struct patch_frame *frame, double *energy, struct err *e);
 
 /* regions.c: sets region[t] of input triangles: connected pieces of one surface,
  * plane or bending by less than the cone at each edge. */

@@ -242,11 +242,12 @@ static json_t *pieces_json(const struct mesher_report *r)
 
 static json_t *refined_json(const struct mesher_report *r)
 {
-	return json_pack("{s:I, s:I, s:I, s:I, s:f, s:f, s:f}",
+	return json_pack("{s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:f}",
 	                 "elements", (json_int_t)r->elements_before,
 	                 "marked", (json_int_t)r->marked,
 	                 "patches", (json_int_t)r->patches_before,
 	                 "patches_marked", (json_int_t)r->patches_marked,
+	                 "patches_for_lobes", (json_int_t)r->patches_for_lobes,
 	                 "error", r->error_before, "error_of_patches", r->patch_error_before,
 	                 "expected_error", r->error_expected);
 }
@@ -329,10 +330,10 @@ static void print_counts(FILE *f, const struct job *j)
 		fprintf(f, "%s%zu contact%s of less than half an element left alone",
 		        r->cut ? "; " : "\nimprint     ", r->fine_contacts, plural(r->fine_contacts));
 	if (j->r->solution)
-		fprintf(f, "\nrefined     %zu of %zu elements, %zu of %zu patches\n"
+		fprintf(f, "\nrefined     %zu of %zu elements, %zu of %zu patches, %zu of them for lobes\n"
 		        "error       %.3g relative (%.3g of it from patches), %.3g expected now",
 		        r->marked, r->elements_before, r->patches_marked, r->patches_before,
-		        r->error_before, r->patch_error_before, r->error_expected);
+		        r->patches_for_lobes, r->error_before, r->patch_error_before, r->error_expected);
 	fprintf(f, "\nelements    %zu", m->elements);
 	print_size(f, "edges", r->element_size);
 	fprintf(f, "patches     %zu, %zu of them plane", m->patches, r->planar_patches);

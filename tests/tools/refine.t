@@ -60,6 +60,27 @@ refuses 1 '0.mesh' "a mesh is no solution" mesh $coarse --refine 0.mesh -o out c
 refuses 2 'refine' "a bound without a solution is wrong usage" \
 	mesh --refine-error .1 -o out cornell.gltf
 
+# A lobe mirrors a wall of which a lamp lights a part; an ideal mirror does.
+for exponent in 20 inf; do
+	prepare $PYTHON -c '
+import sys
+sys.path.insert(0, sys.argv[1])
+import lobes
+n = sys.argv[2]
+spot = lobes.lit_spot(n if n == "inf" else float(n))
+lobes.scene_of("spot", *spot).write(n + ".gltf")
+' "$top/tests/bench" $exponent
+	prepare mesh -q -p .25 -e .25 -o $exponent.0.mesh $exponent.gltf
+	for step in 0 1 2; do
+		prepare solve $exponent.$step
+		prepare mesh -q -p .25 -e .25 --refine $exponent.$step.rad \
+			-o $exponent.$((step + 1)).mesh $exponent.gltf
+	done
+done
+check "a patch that a lobe mirrors is halved" \
+	test "$(report 20.3.mesh patches_for_lobes)" -gt 0
+check "none is for a mirror" test "$(report inf.3.mesh patches_for_lobes)" -eq 0
+
 cat >Makefile <<END
 REFINE = 2
 include $top/tools/pipeline.mk

@@ -216,6 +216,73 @@ static void test_patches(void **state)
 	free(origin);
 }
 
+/* A wall, and a shiny plate of this exponent that faces it at a distance. */
+static void make_plate(struct model *m, double distance, double exponent)
+{
+	begin(m, 2, 1);
+	add_rectangle(m, (double[]){ 0, 0, 0 }, (double[]){ 0, 1, 0 }, (double[]){ 0, 0, 1 }, 0);
+	add_rectangle(m, (double[]){ distance, 0, 0 }, (double[]){ 0, 0, 1 },
+	              (double[]){ 0, 1, 0 }, 1);
+	m->material.rho_d[2] = 0;
+	m->material.rho_s[2] = .9;
+	m->material.alpha[2] = exponent;
+}
+
+/* Patches of a surface. */
+static size_t count(const struct model *m, uint32_t surface)
+{
+	size_t n = 0;
+
+	for (size_t p = 0; p < m->patches; p++)
+		n += m->patch_surface[p] == surface;
+	return n;
+}
+
+/* Patches of the wall that are halved for the plate, where its light is uneven by so much. */
+static size_t halved_for(double distance, double exponent, double uneven)
+{
+	struct model old, m;
+	struct mesher_report r;
+	struct mesher_options o = sizes(.25, .1, 0);
+	struct err e = { 0 };
+	uint32_t *origin;
+
+	make_plate(&old, distance, exponent);
+	r = run(&old, o);
+	mesher_report_free(&r);
+	struct solution s = lit(&old);
+	for (size_t i = 0; i < old.elements; i++) {
+		double c[3];
+		centroid(&old, i, c);
+		s.direct[2 * i] += uneven * sin(8 * acos(-1) * c[2]);
+	}
+	size_t wall = count(&old, 0), plate = count(&old, 1);
+	make_plate(&m, distance, exponent);
+	assert_int_equal(mesher_refine(&m, &o, &old, &s, &how, &origin, &r, &e), 0);
+	size_t halved = r.patches_for_lobes;
+	assert_int_equal(r.patches_marked, halved);
+	assert_int_equal(count(&m, 1), plate);
+	assert_int_equal(count(&m, 0) > wall, halved > 0);
+	solution_free(&s);
+	mesher_report_free(&r);
+	model_free(&old);
+	model_free(&m);
+	free(origin);
+	return halved;
+}
+
+/* Uneven light that a lobe sees is halved: not where the lobe is far, wide or a mirror, nor
+ * where the light is even. */
+static void test_lobes(void **state)
+{
+	(void)state;
+	assert_int_equal(halved_for(.5, 50, .4), 16);
+	assert_int_equal(halved_for(30, 50, .4), 0);
+	assert_int_equal(halved_for(.5, .01, .4), 0);
+	assert_int_equal(halved_for(.5, INFINITY, .4), 0);
+	assert_int_equal(halved_for(.5, 50, 0), 0);
+}
+
 static void test_changed(void **state)
 {
 	struct model old, m;
@@ -245,7 +312,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_conforming), cmocka_unit_test(test_elsewhere),
 		cmocka_unit_test(test_nothing_to_do), cmocka_unit_test(test_patches),
-		cmocka_unit_test(test_changed),
+		cmocka_unit_test(test_lobes), cmocka_unit_test(test_changed),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
