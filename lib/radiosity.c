@@ -34,8 +34,8 @@ static int solution_arrays(struct solution *s, const struct model *m,
 	s->shot = mem_new(t->rows, 2 * channels * sizeof(double), "shot flux", e);
 	s->ledger = mem_new(LEDGER_TERMS, channels * sizeof(double), "ledger", e);
 	return s->direct && s->caustic && s->indirect && s->error && s->error_direct &&
-	       s->discretisation && s->discretisation_direct && s->unshot_emission && s->unshot_diffuse && s->unshot_link && s->shot &&
-	       s->ledger ? 0 : -1;
+	       s->discretisation && s->discretisation_direct && s->unshot_emission &&
+	       s->unshot_diffuse && s->unshot_link && s->shot && s->ledger ? 0 : -1;
 }
 
 int solution_begin(struct solution *s, const struct model *m, const struct transport *t,
