@@ -95,6 +95,20 @@ def khodulev(oracle):
             "lights": [{"name": "lamp", "kind": "point", "intensity": 50000}], "expect": expect}
 
 
+def graded(oracle, fractions):
+    """The same scene with its rectangles cut along both edges at these fractions, for light
+    that changes fast where faces meet."""
+    faces = []
+    for face in oracle["faces"]:
+        a, b, _, d = np.array(face["verts"], float)
+        at = lambda u, v: (a + u * (b - a) + v * (d - a)).tolist()
+        spans = list(zip(fractions, fractions[1:]))
+        faces += [{**face, "name": f"{face['name']} {u},{v}", "verts": [at(u, v), at(x, v), at(x, y), at(u, y)]}
+                  for u, x in spans for v, y in spans]
+    expect = [{**e, "face": e["face"] + "*"} for e in oracle["expect"]]
+    return {**oracle, "faces": faces, "expect": expect}
+
+
 def small_lamp(oracle):
     """CIE 171, 5.2: a source of 1000 cd straight down as a patch of 1 cm2, 3 m above a floor."""
     materials = {"floor": {"front": {}, "back": {}},
