@@ -7,6 +7,7 @@ Each face becomes a node of its own name; rectangles keep their float64 corners 
 unit square under a matrix), other polygons are rounded to float32. An exitance E
 becomes the radiance E/pi. A material whose back has no coefficient and no emission,
 and whose front does not transmit, is one-sided."""
+import fnmatch
 import json
 import math
 import os
@@ -95,15 +96,17 @@ def khodulev(oracle):
             "lights": [{"name": "lamp", "kind": "point", "intensity": 50000}], "expect": expect}
 
 
-def graded(oracle, fractions):
-    """The same scene with its rectangles cut along both edges at these fractions, for light
-    that changes fast where faces meet."""
+def graded(oracle, cuts):
+    """The same scene with its rectangles cut along both edges at fractions, for light that
+    changes fast in places. cuts: {pattern of names: fractions}, the first that fits counts."""
     faces = []
     for face in oracle["faces"]:
         a, b, _, d = np.array(face["verts"], float)
         at = lambda u, v: (a + u * (b - a) + v * (d - a)).tolist()
+        fractions = next(cuts[p] for p in cuts if fnmatch.fnmatchcase(face["name"], p))
         spans = list(zip(fractions, fractions[1:]))
-        faces += [{**face, "name": f"{face['name']} {u},{v}", "verts": [at(u, v), at(x, v), at(x, y), at(u, y)]}
+        faces += [{**face, "name": f"{face['name']} {u},{v}",
+                   "verts": [at(u, v), at(x, v), at(x, y), at(u, y)]}
                   for u, x in spans for v, y in spans]
     expect = [{**e, "face": e["face"] + "*"} for e in oracle["expect"]]
     return {**oracle, "faces": faces, "expect": expect}
