@@ -19,8 +19,7 @@ fitted point value the elements' errors are combined as if they were independent
 a particle meets many elements, so means of particles are judged by the spread of
 independent runs.
 A point value is the mean of a tiny element there, if the scene was cut so, else the
-local quadratic whose element means fit the computed ones
-best. E/pi is rounded in the scene, hence the floor of 4e-15 under every relative
+local quadratic whose element means fit the computed ones best. E/pi is rounded in the scene, hence the floor of 4e-15 under every relative
 tolerance; an expected 0 must be exactly 0."""
 import argparse
 import fnmatch
@@ -101,9 +100,9 @@ BEST = {
     "cie171_5.8_*":           (1/8,  1/8,  ANALYTIC, ["-e", "1e-9"]),
     "cie171_5.3_*":           (1/16, 1/32, ANALYTIC, ["-e", "1e-9"]),
     "cie":                    (1/16, 1/32, ANALYTIC, ["-e", "1e-9"]),
-    "cornell":                (1/64, 1/64, ["-n", "2048"], ["-e", "1e-6"]),
+    "cornell":                (1/64, 1/64, ["-n", "6144"], ["-e", "1e-6"]),
     "open_lobe_normaliser":   (1/8,  1/8,  ["-n", "16384", *LOBES], ["-e", "1e-9"]),
-    "phong_to_mirror_*":      (1/4,  1/4,  ["-n", "65536", *LOBES], ["-e", "1e-9"]),
+    "*_to_mirror_*":          (1/4,  1/4,  ["-n", "65536", *LOBES], ["-e", "1e-9"]),
     "specular":               (1/4,  1/4,  ["-m", "analytic", "-n", "262144"], ["-e", "1e-9"]),
 }
 # Particles of the yardstick: fewer where each one is reflected a thousand times, more where
@@ -349,7 +348,8 @@ def evaluate(oracle, method, folder):
     path = lambda suffix: os.path.join(folder, oracle["id"] + suffix)
     try:
         convert(oracle, path(".gltf"))
-        run("mesh", path(".gltf"), "-o", path(".mesh"), "-p", patch * longest, "-e", element * longest)
+        run("mesh", path(".gltf"), "-o", path(".mesh"), "-p", patch * longest, "-e", element * longest,
+            "--lobe", "reciprocal" if oracle.get("lobe") == "reciprocal" else "paper")
         if method == "reference":
             field, ledger = particle_field(path(".mesh"), oracle["id"])
             return list(values_of(oracle, method, field, ledger, folder))
