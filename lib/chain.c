@@ -50,7 +50,8 @@ int chains_init(struct chains *c, const struct model *m, uint32_t most, struct e
 	uint32_t *none = mem_new(c->events, sizeof *none, "chains", e);
 	/* Rows of no events must have an address too. */
 	int bad = !none || vec_reserve(&c->count, 1, sizeof *none, e) ||
-	          vec_reserve(&c->child, 1, sizeof *none, e) || rehash(c, 64, e) || chains_find(c, none, e) == CHAIN_NONE;
+	          vec_reserve(&c->child, 1, sizeof *none, e) || rehash(c, 64, e) ||
+	          chains_find(c, none, e) == CHAIN_NONE;
 	free(none);
 	return bad ? -1 : 0;
 }

@@ -5,6 +5,7 @@
 
 void clear_init(struct clear *x, double relative)
 {
+	x->relative = relative;
 	cubature_reach(relative, x->reach);
 }
 
@@ -62,19 +63,21 @@ static double lambert(const struct facet *a, const struct cubature *c, const str
 	return sum;
 }
 
-double clear_exchange(struct clear *x, const struct facet *a, const struct cubature *pa,
-                      const struct facet *b, const struct cubature *pb)
+double clear_exchange(struct clear *x, const struct facet *a, struct clear_points pa,
+                      const struct facet *b, struct clear_points pb)
 {
 	struct cubature ra, rb;
 	double d[3];
 
+	if (pa.joint && pb.joint && joint_reaches(a, pa.joint, b, pb.joint, x->relative))
+		return joint_exchange(a, pa.joint, b, pb.joint);
 	v3_sub(b->centre, a->centre, d);
 	double apart = v3_length(d);
 	int la = level(x, a, apart - b->radius), lb = level(x, b, apart - a->radius);
 
 	if (la < CUBATURE_LEVELS && lb < CUBATURE_LEVELS) {
-		return cubature_exchange(a, points(x, 0, a, pa, la, &ra), b,
-		                         points(x, 1, b, pb, lb, &rb));
+		return cubature_exchange(a, points(x, 0, a, pa.level, la, &ra), b,
+		                         points(x, 1, b, pb.level, lb, &rb));
 	}
 	/* A small facet close to a large one. */
 	const struct facet *small = a->radius < b->radius ? a : b, *large = small == a ? b : a;

@@ -150,10 +150,38 @@ void cubature_fill(const struct facet *f, int level, struct cubature *c)
 	}
 }
 
+/* r^4 from four points to one. */
+static four fourth_power(const struct cubature *c, int j, const double p[3])
+{
+	four x = *(const four *)(c->x + j) - p[0], y = *(const four *)(c->y + j) - p[1];
+	four z = *(const four *)(c->z + j) - p[2], r2 = x * x + y * y + z * z;
+
+	return r2 * r2;
+}
+
+/* The sum of height / r^4 over all points as seen from one, in four parts. */
+static four seen_from(const struct cubature *from, int i, const struct cubature *c,
+                      const double *height)
+{
+	const double p[3] = { from->x[i], from->y[i], from->z[i] };
+	four sum = { 0 };
+	int j = 0;
+
+	/* x / p + y / q by one division. */
+	for (; j + 4 < c->n; j += 8) {
+		four a = fourth_power(c, j, p), b = fourth_power(c, j + 4, p);
+		sum += (*(const four *)(height + j) * b + *(const four *)(height + j + 4) * a) / (a * b);
+	}
+	if (j < c->n)
+		sum += *(const four *)(height + j) / fourth_power(c, j, p);
+	return sum;
+}
+
 double cubature_exchange(const struct facet *a, const struct cubature *ca,
                          const struct facet *b, const struct cubature *cb)
 {
-	double height[FACET_CORNERS * 18], sum = 0;
+	double height[FACET_CORNERS * 18];
+	four sum = { 0 };
 
 	/* The cosines' distances from each plane depend on one point only. */
 	for (int j = 0; j < cb->n; j += 4) {
@@ -163,21 +191,13 @@ double cubature_exchange(const struct facet *a, const struct cubature *ca,
 		                              a->normal[2] * *z - a->offset);
 	}
 	for (int i = 0; i < ca->n; i++) {
-		four all = { 0 };
 		if (ca->w[i] == 0)
 			continue;
 		double h = b->normal[0] * ca->x[i] + b->normal[1] * ca->y[i] +
 		           b->normal[2] * ca->z[i] - b->offset;
-		for (int j = 0; j < cb->n; j += 4) {
-			four x = *(const four *)(cb->x + j) - ca->x[i];
-			four y = *(const four *)(cb->y + j) - ca->y[i];
-			four z = *(const four *)(cb->z + j) - ca->z[i];
-			four r2 = x * x + y * y + z * z;
-			all += *(const four *)(height + j) / (r2 * r2);
-		}
-		sum += ca->w[i] * h * (all[0] + all[1] + all[2] + all[3]);
+		sum += ca->w[i] * h * seen_from(ca, i, cb, height);
 	}
-	return sum / PI;
+	return (sum[0] + sum[1] + sum[2] + sum[3]) / PI;
 }
 
 /* Relative errors measured on triangles and rectangles seen by far smaller ones are below

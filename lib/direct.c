@@ -23,7 +23,7 @@ enum {
 };
 
 /* Shadow rays of a part: at first, and at most. */
-enum { RAYS_FIRST = 16, RAYS_MOST = 256 };
+enum { RAYS_FIRST = 4, RAYS_MOST = 256 };
 
 struct direct {
 	const struct model *m;
@@ -274,6 +274,12 @@ static double exact(struct direct_worker *w, const struct outlook *o, const doub
 
 /* ---- by shadow rays ---- */
 
+/* cos^m; nearly every emitter has m = 1. */
+static double lobe(double cosine, double exponent)
+{
+	return exponent == 1 ? cosine : pow(cosine, exponent);
+}
+
 /* About what an emitter would bring if nothing were hidden: the density that it is chosen
  * with. 0 only if it is behind the plane of x, or x behind its plane. */
 static double guess(const struct direct_worker *w, const struct emitter *t, const double x[3])
@@ -286,7 +292,7 @@ static double guess(const struct direct_worker *w, const struct emitter *t, cons
 		return 0;
 	v3_sub(t->f.centre, x, d);
 	double r2 = fmax(v3_dot(d, d), t->f.radius * t->f.radius), r = sqrt(r2);
-	return t->power * pow(fmin(1, there / r), t->exponent) * (highest / r) / r2;
+	return t->power * lobe(fmin(1, there / r), t->exponent) * (highest / r) / r2;
 }
 
 /* A point of a convex facet. */
@@ -342,14 +348,22 @@ static void add_ray(struct direct_worker *w, const double x[3], size_t n, const 
 	double here = v3_dot(v, w->normal) / r, there = -v3_dot(v, t->f.normal) / r;
 	if (!(here > 0 && there > 0 && share > 0) || !clear_line(w, x, y, t))
 		return;
-	double scale = here * pow(there, t->exponent) / r2 * t->f.area / share;
+	double scale = here * lobe(there, t->exponent) / r2 * t->f.area / share;
 	for (int b = 0; b < d->m->bands; b++)
 		h[b] += scale * t->radiance[b];
 }
 
-/* Mean of the parts, its standard error, and whether that is small enough. */
-static int settled(double part[PARTS][BANDS_MAX], int bands, double rays, double relative, double *h,
-                   double *error)
+/* What sampling is to reach. */
+struct aim {
+	double relative;
+	const double *other;
+	double unhidden;              /* about what there would be if nothing were hidden */
+};
+
+/* Mean of the parts, its standard error, and whether that is small enough. Where no ray
+ * arrived, the next one may be the first that does. */
+static int settled(double part[PARTS][BANDS_MAX], int bands, double rays, const struct aim *aim,
+                   double *h, double *error)
 {
 	int good = 1;
 
@@ -360,27 +374,34 @@ static int settled(double part[PARTS][BANDS_MAX], int bands, double rays, double
 		for (int p = 0; p < PARTS; p++)
 			square += (part[p][b] - mean) * (part[p][b] - mean);
 		h[b] = mean / rays;
-		error[b] = sqrt(square / (PARTS * (PARTS - 1))) / rays;
-		good &= error[b] <= relative * h[b];
+		error[b] = mean > 0 ? sqrt(square / (PARTS * (PARTS - 1))) / rays
+		                    : aim->unhidden / (PARTS * rays);
+		good &= error[b] <= aim->relative * (h[b] + aim->other[b]);
 	}
 	return good;
 }
 
 /* What the first n emitters bring, or outlooks, by their cumulated weights. */
 static void sample(struct direct_worker *w, const double x[3], size_t n, uint64_t seed,
-                   double relative, double *h, double *error)
+                   const struct aim *aim, double *h, double *error)
 {
 	double part[PARTS][BANDS_MAX] = { { 0 } }, u[3];
-	uint32_t from = 0;
+	uint32_t from = 0, scramble[PARTS][3], bits[3];
 
+	for (int p = 0; p < PARTS; p++)
+		for (int k = 0; k < 3; k++)
+			scramble[p][k] = rng_sobol_seed(seed + (uint64_t)p, k);
 	for (uint32_t to = RAYS_FIRST; to <= RAYS_MOST; from = to, to *= 2) {
-		for (int p = 0; p < PARTS; p++)
-			for (uint32_t i = from; i < to; i++) {
+		for (uint32_t i = from; i < to; i++) {
+			for (int k = 0; k < 3; k++)
+				bits[k] = rng_sobol_bits(i, k);
+			for (int p = 0; p < PARTS; p++) {
 				for (int k = 0; k < 3; k++)
-					u[k] = rng_sobol(i, k, seed + (uint64_t)p);
+					u[k] = rng_scramble(bits[k], scramble[p][k]);
 				add_ray(w, x, n, u, part[p]);
 			}
-		if (settled(part, w->d->m->bands, to, relative, h, error))
+		}
+		if (settled(part, w->d->m->bands, to, aim, h, error))
 			return;
 	}
 }
@@ -408,7 +429,7 @@ static void add_lights(struct direct_worker *w, const double world[3], double *h
 }
 
 int direct_at(struct direct_worker *w, const double world[3], uint64_t seed, double relative,
-              double *h, double *error, struct err *e)
+              const double *other, double *h, double *error, struct err *e)
 {
 	const struct direct *d = w->d;
 	size_t n = d->exact ? w->outlooks : d->emitters.n;
@@ -424,7 +445,7 @@ int direct_at(struct direct_worker *w, const double world[3], uint64_t seed, dou
 		w->weight[i] = sum;
 	}
 	if (sum > 0)
-		sample(w, x, n, seed, relative, h, error);
+		sample(w, x, n, seed, &(struct aim){ relative, other, sum }, h, error);
 	for (size_t i = 0; i < n && d->exact; i++) {
 		if (w->outlook[i].sampled)
 			continue;

@@ -34,11 +34,12 @@ void direct_begin(struct direct_worker *w, uint32_t element_side);
 
 /* Irradiance of the side at a point x (world) of its element from all emitters and lights, into
  * h[bands], and its standard error into error[bands] (0 where it is exact). Shadow rays
- * are aimed by `seed`, as many as it takes for an error of `relative` times h, within
- * limits. The result depends on nothing else. 0, or -1 and e when memory is short.
+ * are aimed by `seed`, as many as it takes for an error of `relative` times h and what the
+ * point has beside, other[bands], within limits. The result depends on nothing else. 0, or
+ * -1 and e when memory is short.
  * O(emitters x bodies between + lights). */
 int direct_at(struct direct_worker *w, const double x[3], uint64_t seed, double relative,
-              double *h, double *error, struct err *e);
+              const double *other, double *h, double *error, struct err *e);
 
 /* 1 if emitters are few enough to be looked at one by one. */
 int direct_exact(const struct direct *d);

@@ -20,7 +20,7 @@ static const double error_by_curvature = 1. / 3, error_by_roughness = 1.7;
 /* Noise is not equal everywhere: so much of it is taken for no detail. */
 static const double noise_guard = 2;
 
-enum { NEAR_MAX = 64, CHUNK = 256 };
+enum { NEAR_MAX = 64, CHUNK = 256, PARTS = 2 };
 
 struct near {
 	uint32_t element;
@@ -32,9 +32,12 @@ struct job {
 	const struct model *m;
 	struct solution *s;
 	struct smooth_groups g;
-	double *h;            /* [2E][bands] irradiance */
-	double *difference;   /* [2E][bands] second difference; NAN: not determined */
-	double *noise;        /* [2E][bands] its variance by the standard errors */
+	/* [2E][parts][bands]: light straight from emitters, which has the edges, apart from
+	 * other light, which has the noise. */
+	double *h;            /* irradiance */
+	double *variance;     /* of it, by the standard errors */
+	double *difference;   /* second difference; NAN: not determined */
+	double *noise;        /* its variance */
 };
 
 /* Elements of the same smooth surface that share `corners` vertices or more with e, by
@@ -133,20 +136,18 @@ static size_t stencil(const struct job *j, size_t e, struct near *near)
 static void differences(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct job *j = arg;
-	size_t channels = 2 * (size_t)j->s->bands;
+	size_t channels = 2 * PARTS * (size_t)j->s->bands;
 	struct near near[NEAR_MAX];
 
 	(void)thread;
 	for (size_t e = begin; e < end; e++) {
 		size_t n = stencil(j, e, near);
 		for (size_t c = 0; c < channels; c++) {
-			double error = j->s->error[e * channels + c], d = j->h[e * channels + c];
-			double noise = error * error;
+			double d = j->h[e * channels + c], noise = j->variance[e * channels + c];
 			for (size_t i = 0; i < n; i++) {
 				size_t at = near[i].element * channels + c;
-				error = near[i].w * j->s->error[at];
 				d -= near[i].w * j->h[at];
-				noise += error * error;
+				noise += near[i].w * near[i].w * j->variance[at];
 			}
 			j->difference[e * channels + c] = n ? d : (double)NAN;
 			j->noise[e * channels + c] = noise;
@@ -158,15 +159,16 @@ static void differences(void *arg, size_t begin, size_t end, int thread)
 
 /* A quantile of difference squared over its stated variance, to 5 %, by a histogram of
  * logarithms; INFINITY where there is no noise. */
-static double quantile_of_ratios(const struct job *j, double q)
+static double quantile_of_ratios(const struct job *j, size_t part, double q)
 {
 	enum { BINS = 2048, A_FACTOR_2 = 16 };
-	size_t n = j->s->element_sides * (size_t)j->s->bands, count[BINS] = { 0 }, all = 0, below = 0;
+	size_t bands = (size_t)j->s->bands, n = j->s->element_sides * PARTS * bands;
+	size_t count[BINS] = { 0 }, all = 0, below = 0;
 	int bin = 0;
 
 	for (size_t i = 0; i < n; i++) {
 		double d = j->difference[i];
-		if (isnan(d) || !(j->noise[i] > 0))
+		if (i / bands % PARTS != part || isnan(d) || !(j->noise[i] > 0))
 			continue;
 		double at = BINS / 2 + A_FACTOR_2 * log2(fmax(d * d / j->noise[i], 1e-18));
 		count[(size_t)fmax(0, fmin(BINS - 1, at))]++;
@@ -183,12 +185,17 @@ static void correct_noise(struct job *j)
 {
 	/* Steps are in the other elements. Of chi-square with one degree of freedom: */
 	static const double most = .7, chi_square = 1.0742;
-	size_t n = j->s->element_sides * (size_t)j->s->bands;
-	double scale = fmin(1, quantile_of_ratios(j, most) / chi_square);
+	size_t bands = (size_t)j->s->bands, n = j->s->element_sides * bands;
+	double scale[PARTS];
 
+	for (size_t part = 0; part < PARTS; part++)
+		scale[part] = fmin(1, quantile_of_ratios(j, part, most) / chi_square);
+	for (size_t i = 0; i < n * PARTS; i++)
+		j->noise[i] *= scale[i / bands % PARTS];
 	for (size_t i = 0; i < n; i++) {
-		j->s->error[i] *= sqrt(scale);
-		j->noise[i] *= scale;
+		const double *v = &j->variance[i / bands * PARTS * bands + i % bands];
+		j->s->error_direct[i] = sqrt(scale[0] * v[0]);
+		j->s->error[i] = sqrt(scale[0] * v[0] + scale[1] * v[bands]);
 	}
 }
 
@@ -211,56 +218,81 @@ static void add(const struct job *j, size_t e, size_t at, struct moments *m)
 	m->noise += a * j->noise[at];
 }
 
-static double error_of(const struct moments *m)
+static double square_error(const struct moments *m)
 {
 	if (!(m->area > 0))
 		return 0;
 	double mean = m->mean / m->area, all = (m->square - noise_guard * m->noise) / m->area;
 	double square = error_by_roughness * error_by_roughness * (all - mean * mean) +
 	                error_by_curvature * error_by_curvature * mean * mean;
-	return square > 0 ? sqrt(square) : 0;
+	return square > 0 ? square : 0;
 }
 
 static void errors(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct job *j = arg;
-	size_t channels = 2 * (size_t)j->s->bands;
+	size_t bands = (size_t)j->s->bands, channels = 2 * PARTS * bands;
 	struct near near[NEAR_MAX];
 
 	(void)thread;
 	for (size_t e = begin; e < end; e++) {
 		size_t n = list_near(j, e, 1, near);
+		double *to = &j->s->discretisation[2 * e * bands];
+		double *direct = &j->s->discretisation_direct[2 * e * bands];
+		memset(to, 0, 2 * bands * sizeof *to);
 		for (size_t c = 0; c < channels; c++) {
 			struct moments m = { 0 };
 			add(j, e, e * channels + c, &m);
 			for (size_t i = 0; i < n; i++)
 				add(j, near[i].element, near[i].element * channels + c, &m);
-			j->s->discretisation[e * channels + c] = error_of(&m);
+			size_t at = c / (PARTS * bands) * bands + c % bands;
+			double square = square_error(&m);
+			to[at] += square;
+			if (c / bands % PARTS == 0)
+				direct[at] = sqrt(square);
 		}
+		for (size_t c = 0; c < 2 * bands; c++)
+			to[c] = sqrt(to[c]);
+	}
+}
+
+static void take_parts(const struct job *j)
+{
+	const struct solution *s = j->s;
+	size_t bands = (size_t)s->bands, n = s->element_sides * bands;
+
+	for (size_t i = 0; i < s->groups * n; i++) {
+		double *h = &j->h[i % n / bands * PARTS * bands + i % bands];
+		h[0] += s->direct[i];
+		h[bands] += s->caustic[i] + s->indirect[i];
+	}
+	for (size_t i = 0; i < n; i++) {
+		double *v = &j->variance[i / bands * PARTS * bands + i % bands];
+		v[0] = s->error_direct[i] * s->error_direct[i];
+		v[bands] = fmax(0, s->error[i] * s->error[i] - v[0]);
 	}
 }
 
 int discretisation_estimate(const struct model *m, struct solution *s, int threads,
                             struct err *e)
 {
-	size_t n = s->element_sides * (size_t)s->bands;
+	size_t n = s->element_sides * PARTS * (size_t)s->bands;
 	struct job j = { .m = m, .s = s };
 	int bad = 1;
 
 	j.h = mem_new(n, sizeof *j.h, "irradiance", e);
 	j.difference = mem_new(n, sizeof *j.difference, "irradiance", e);
 	j.noise = mem_new(n, sizeof *j.noise, "irradiance", e);
-	if (j.h && j.difference && j.noise && !smooth_groups_new(m, cos_crease, &j.g, e)) {
-		for (size_t g = 0; g < s->groups; g++)
-			for (size_t i = 0; i < n; i++)
-				j.h[i] += s->direct[g * n + i] + s->caustic[g * n + i] +
-				          s->indirect[g * n + i];
+	j.variance = mem_new(n, sizeof *j.variance, "irradiance", e);
+	if (j.h && j.variance && j.difference && j.noise && !smooth_groups_new(m, cos_crease, &j.g, e)) {
+		take_parts(&j);
 		par_for(m->elements, CHUNK, threads, differences, &j, NULL);
 		correct_noise(&j);
 		par_for(m->elements, CHUNK, threads, errors, &j, NULL);
 		bad = 0;
 	}
 	free(j.h);
+	free(j.variance);
 	free(j.difference);
 	free(j.noise);
 	smooth_groups_free(&j.g);

@@ -6,7 +6,8 @@
  * touch it, the mean of that is its curvature, which costs interpolation a third of it.
  * Its variation, less what the standard errors of the elements put into it, is of steps
  * (shadow edges, contacts, rims of caustics), which cost more than they show: a step
- * through the middle of an element is felt through its neighbours.
+ * through the middle of an element is felt through its neighbours. Light straight from
+ * emitters is looked at apart from other light.
  *
  * The same differences tell how good the standard errors are: they take samples for
  * independent, while stratified ones do better. */
@@ -16,10 +17,11 @@
 #include "model.h"
 #include "solution.h"
 
-/* Scales s->error, all alike, down to what most elements differ by from their neighbours,
- * if that is less. Fills s->discretisation [2E][bands], in units of irradiance: root mean
- * square over the element-side. 0 where too few others of the same smooth surface touch
- * it and its neighbours, since nothing is known there. Light groups are summed. O(elements), the same
+/* Scales standard errors, of each part all alike, down to what most elements differ by from
+ * their neighbours, if that is less. Fills s->discretisation and its part
+ * s->discretisation_direct [2E][bands], in units of irradiance: root mean square over the
+ * element-side. 0 where too few others of the same smooth surface touch it and its
+ * neighbours, since nothing is known there. Light groups are summed. O(elements), the same
  * for any number of threads. 0, or -1 and e. */
 int discretisation_estimate(const struct model *m, struct solution *s, int threads,
                             struct err *e);

@@ -78,7 +78,7 @@ static double crowded(struct exchanger *x, const struct facet *a, const struct f
 /* The part of a facet in front of another's plane. NULL if there is none; *points are
  * dropped where the facet is cut. */
 static const struct facet *front_part(const struct facet *f, const struct facet *of, double near,
-                                      struct facet_room *room, const struct cubature **points)
+                                      struct facet_room *room, struct clear_points *points)
 {
 	double lowest, highest, h = v3_dot(of->normal, f->centre) - of->offset;
 
@@ -91,14 +91,15 @@ static const struct facet *front_part(const struct facet *f, const struct facet 
 		return NULL;
 	if (lowest >= -near)
 		return f;
-	*points = NULL;
+	*points = (struct clear_points){ NULL, NULL };
 	return facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
 }
 
 double exchange(struct exchanger *x, const struct facet_set *sa, uint32_t i,
                 const struct facet_set *sb, uint32_t j, double *error, struct err *e)
 {
-	const struct cubature *pa = sa->stored[i], *pb = sb->stored[j];
+	struct clear_points pa = { sa->stored[i], &sa->joint[i] };
+	struct clear_points pb = { sb->stored[j], &sb->joint[j] };
 	struct facet_room room[2];
 	double near = x->bodies->near;
 	const struct facet *fa = &sa->facet[i], *fb = &sb->facet[j];

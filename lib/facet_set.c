@@ -126,16 +126,19 @@ static int store_points(struct facet_set *s, struct err *e)
 			total += (size_t)cubature_points(s->facet[i].n, l);
 	s->stored = mem_new(s->facets, sizeof *s->stored, "cubature points", e);
 	s->points = mem_new(total, 4 * sizeof *s->points, "cubature points", e);
-	if (!s->stored || !s->points)
+	s->joint = mem_new(s->facets, sizeof *s->joint, "cubature points", e);
+	if (!s->stored || !s->points || !s->joint)
 		return -1;
 	double *at = s->points;
-	for (size_t i = 0; i < s->facets; i++)
+	for (size_t i = 0; i < s->facets; i++) {
+		joint_fill(&s->facet[i], &s->joint[i]);
 		for (int l = 0; l < levels; l++) {
 			size_t n = (size_t)cubature_points(s->facet[i].n, l);
 			s->stored[i][l] = (struct cubature){ 0, at, at + n, at + 2 * n, at + 3 * n };
 			cubature_fill(&s->facet[i], l, &s->stored[i][l]);
 			at += 4 * n;
 		}
+	}
 	return 0;
 }
 
@@ -173,5 +176,6 @@ void facet_set_free(struct facet_set *s)
 	free(s->corner);
 	free(s->stored);
 	free(s->points);
+	free(s->joint);
 	*s = (struct facet_set){ 0 };
 }

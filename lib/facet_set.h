@@ -6,6 +6,7 @@
 
 #include "cubature.h"
 #include "err.h"
+#include "joint.h"
 #include "model.h"
 
 /* A place is a patch-side or an element-side. Corners are relative to the scene's
@@ -17,6 +18,7 @@ struct facet_set {
 	double *corner;
 	struct cubature (*stored)[CUBATURE_LEVELS]; /* [facets], n = 0: not kept */
 	double *points;           /* of all of them */
+	struct joint *joint;      /* [facets] */
 };
 
 enum facet_places { FACETS_OF_PATCHES, FACETS_OF_ELEMENTS };

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ff_tally.h"
+#include "link_key.h"
 
 int batch_begin(struct ff_batch *b, struct err *e)
 {
@@ -76,27 +77,10 @@ static int map_chain(uint32_t *chain, const struct chains *local, struct vec *ma
 	return *to == CHAIN_NONE ? -1 : 0;
 }
 
-struct link {
-	uint32_t target, source, last, chain, row[2], order;
-	float direction[3];
-};
-
-static int by_link(const void *a, const void *b)
-{
-	const struct link *x = a, *y = b;
-	if (x->target != y->target)
-		return x->target < y->target ? -1 : 1;
-	if (x->chain != y->chain)
-		return x->chain < y->chain ? -1 : 1;
-	if (x->source != y->source)
-		return x->source < y->source ? -1 : 1;
-	return (x->order > y->order) - (x->order < y->order);
-}
-
 static int sort_links(struct ff_batch *b, struct err *e)
 {
 	size_t n = b->link_target.n;
-	struct link *l = mem_new(n, sizeof *l, "links", e);
+	struct link_key *l = mem_new(n, sizeof *l, "links", e);
 	uint32_t *target = b->link_target.data, *source = b->link_source.data;
 	uint32_t *last = b->link_last.data;
 	uint32_t *chain = b->link_chain.data, *row = b->link_row.data;
@@ -105,12 +89,12 @@ static int sort_links(struct ff_batch *b, struct err *e)
 	if (!l)
 		return -1;
 	for (size_t i = 0; i < n; i++) {
-		l[i] = (struct link){ target[i], source[i], last[i], chain[i],
+		l[i] = (struct link_key){ target[i], source[i], last[i], chain[i],
 		                      { row[2 * i], row[2 * i + 1] }, (uint32_t)i, { 0 } };
 		memcpy(l[i].direction, &direction[3 * i], sizeof l[i].direction);
 	}
 	if (n)
-		qsort(l, n, sizeof *l, by_link);
+		qsort(l, n, sizeof *l, link_key_order);
 	for (size_t i = 0; i < n; i++) {
 		target[i] = l[i].target;
 		source[i] = l[i].source;

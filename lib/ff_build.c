@@ -9,8 +9,8 @@
 #include "ff_matrix.h"
 #include "vec3.h"
 
-enum { FORMULA_EVALUATIONS = 1000, FORMULA_BODIES = 8, PATCHES_AT_A_TIME = 64, SOBOL_POINTS_MAX = 1 << 16,
-       GATHER_FEWEST = 32 };
+enum { FORMULA_EVALUATIONS = 1000, FORMULA_BODIES = 8, PATCHES_AT_A_TIME = 64,
+       SOBOL_POINTS_MAX = 1 << 16, GATHER_FEWEST = 32 };
 
 /* Of what nothing hides, by formula to elements: finer than any picture shows. */
 static const double FORMULA_ERROR = 1e-5;

@@ -171,7 +171,8 @@ static void judge(struct matrix *m, size_t r, struct ff_rest *rest)
 	double area = m->area[m->first + r], sum = 0;
 
 	for (size_t j = 0; j < m->n; j++)
-		sum += get(m, r, j) / area;
+		sum += get(m, r, j);
+	sum /= area;
 	row->side = m->side[m->first + r];
 	row->residual = 1 - sum;
 	row->error = row->error / area + m->thread[0].x.o.relative * sum;
@@ -337,7 +338,7 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
               struct ff_stats *stats, const struct progress *progress, struct err *e)
 {
 	struct matrix m = { .job = j };
-	struct exchange_options o = { .relative = j->o.f64 ? 1e-9 : 4e-7, .absolute = j->o.target,
+	struct exchange_options o = { .relative = j->o.f64 ? 1e-9 : 8e-7, .absolute = j->o.target,
 	                              .most = j->o.evaluations, .bodies = SIGHT_BLOCKERS,
 	                              .crowd_rays = CROWD_RAYS };
 	size_t a = 0, b;

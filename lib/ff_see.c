@@ -17,8 +17,9 @@ static const double plenty = .04;
  * one by chance, which keeps the expectation. */
 static const double faint = .25;
 
-/* ... and is worth a formula if by as many rays. */
-static const double worth = 1;
+/* ... and is worth a formula if by as many rays, or, however small it is, if the source is
+ * as much of what it can see. */
+static const double worth = 1, much = 1e-5;
 
 /* The form factor per area between two points. */
 static double kernel(const double x[3], const double nx[3], const double y[3],
@@ -44,6 +45,7 @@ static void point_on(const struct ff_element *el, double u0, double u1, double x
 /* An element-side as the centre of the source sees it. */
 struct outlook {
 	double want;  /* of the row's rays, how many may be expected if nothing is in the way */
+	double share; /* of the light that the element could get from all around */
 	int close;    /* so close that weights of pairs of points may vary much */
 };
 
@@ -64,7 +66,8 @@ static struct outlook look(const struct ff_job *j, uint32_t source, uint32_t col
 		return (struct outlook){ 0 };
 	double s2 = fmax(r2, .25 * size * size);
 	double f = fmax(fmax(0, cx) * fmax(0, cy) / s2, .02) / (PI * s2);
-	return (struct outlook){ rays * area * f, r2 < 2 * size * size };
+	return (struct outlook){ rays * area * f, j->m->patch_area[source >> 1] * f,
+	                         r2 < 2 * size * size };
 }
 
 static int above(const struct model *m, uint32_t first, uint32_t end, const double x[3],
@@ -191,7 +194,7 @@ static struct ff_sight sight(struct ff_thread *t, uint32_t source, uint32_t colu
 	double odds = fmin(1, o.want / faint), e, off;
 	uint32_t n = 1;
 
-	if ((t->job->formula.all || o.close || o.want >= worth) &&
+	if ((t->job->formula.all || o.close || o.want >= worth || o.share >= much) &&
 	    ff_formula_has(&t->job->formula, source) &&
 	    ff_formula_exchange(t->formula, &t->job->formula, source, column, &e, &off,
 	                        &t->tally.err)) {

@@ -277,6 +277,7 @@ static int close_by(struct gather_worker *w, const double x[3], uint32_t triangl
 	const struct view_side *s =
 		&v->side[2 * model_patch_material(v->m, v->m->element_patch[place / 2]) + place % 2];
 	const float *rest = w->t->rest + 3 * bands * place;
+	static const double nothing[BANDS_MAX];
 	double at[3], d[3], h[BANDS_MAX], error[BANDS_MAX], p = (double)w1, q = (double)w2;
 
 	for (size_t k = 0; k < 3; k++)
@@ -292,7 +293,7 @@ static int close_by(struct gather_worker *w, const double x[3], uint32_t triangl
 		if (!(side ? s->translucent : s->diffuse))
 			continue;
 		direct_begin(w->direct, (uint32_t)place ^ (uint32_t)side);
-		if (direct_at(w->direct, at, place, ROUGHLY, h, error, &w->e))
+		if (direct_at(w->direct, at, place, ROUGHLY, nothing, h, error, &w->e))
 			return 1;
 		for (size_t b = 0; b < bands; b++)
 			sum[b] += part[b] * h[b];

@@ -45,7 +45,8 @@ struct gather {
 	size_t feeds;
 	struct feed *feed;
 	lanes *flux[H_PARTS];        /* [2][receivers] by side: landing flux */
-	lanes_f32 *variance;         /* [2][receivers], in units of `unit` */
+	lanes_f32 *variance[2];      /* [2][receivers], in units of `unit`: of rows that bring
+	                                direct light, and of others */
 	double unit;                 /* the largest that a whole block adds */
 	size_t channels;
 	size_t first;                /* channel of the four in work */
@@ -125,7 +126,8 @@ static ALWAYS_INLINE void add_as(const struct gather *g, const struct feed *x,
 static void add_feed(const struct gather *g, const struct feed *x, struct place p,
                      uint32_t below)
 {
-	const struct into to = { g->flux[x->to_fresh], g->flux[INDIRECT], g->variance };
+	const struct into to = { g->flux[x->to_fresh], g->flux[INDIRECT],
+		                 g->variance[x->to_fresh != DIRECT || !(x->carries & 1)] };
 
 	if (x->f->value && x->carries == 2)
 		add_as(g, x, &to, p, below, 1, 0, 1);
@@ -302,8 +304,12 @@ static void put_channels(void *arg, size_t begin, size_t end, int thread)
 			size_t at = (c / bands * g->s->element_sides + es) * bands + c % bands;
 			for (int p = 0; p < H_PARTS; p++)
 				to[p][at] = g->flux[p][from][k] / area;
-			if (c < bands)
-				g->s->error[at] = sqrt((double)g->variance[from][k] * g->unit) / area;
+			if (c < bands) {
+				double direct = (double)g->variance[0][from][k] * g->unit;
+				double other = (double)g->variance[1][from][k] * g->unit;
+				g->s->error_direct[at] = sqrt(direct) / area;
+				g->s->error[at] = sqrt(direct + other) / area;
+			}
 		}
 	}
 }
@@ -330,16 +336,17 @@ static int gather_channels(struct gather *g, int threads, struct err *e)
 	void *room, *variance, *feed;
 	lanes *at = lanes_new(H_PARTS * n, &room, "irradiance", e);
 
-	g->variance = (lanes_f32 *)lanes_new((n + 1) / 2, &variance, "irradiance", e);
+	g->variance[0] = (lanes_f32 *)lanes_new(n, &variance, "irradiance", e);
+	g->variance[1] = g->variance[0] + n;
 	g->feed = (struct feed *)lanes_new(g->t->blocks * (sizeof *g->feed / sizeof(lanes)), &feed,
 	                                   "flux by chain", e);
-	int bad = !at || !g->variance || !g->feed;
+	int bad = !at || !variance || !g->feed;
 	for (int p = 0; !bad && p < H_PARTS; p++)
 		g->flux[p] = at + (size_t)p * n;
 	for (g->first = 0; !bad && g->first < g->channels; g->first += LANES) {
 		if (g->first) {
 			memset(at, 0, H_PARTS * n * sizeof *at);
-			memset(g->variance, 0, n * sizeof *g->variance);
+			memset(g->variance[0], 0, 2 * n * sizeof **g->variance);
 		}
 		set_unit(g);
 		set_feeds(g);

@@ -26,8 +26,8 @@ struct light_sight {
 int lights_derive(struct model *m, struct err *e);
 
 /* How a point sees a light, if nothing is between; the falloff between a spot's cones is
- * the extension's ((cos - cos outer) / (cos inner - cos outer))^2; `clear` is how far before the light a
- * ray ends (ray_offset). */
+ * the extension's ((cos - cos outer) / (cos inner - cos outer))^2; `clear` is how far before
+ * the light a ray ends (ray_offset). */
 void light_see(const struct lights *l, size_t light, const double x[3], double clear,
                struct light_sight *s);
 

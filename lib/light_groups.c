@@ -160,7 +160,9 @@ static void scale_irradiance(struct solution *s, const double *factor)
 		double after = solution_irradiance(s, i / bands, (int)(i % bands));
 		double change = before > 0 ? after / before : most;
 		s->error[i] *= change;
+		s->error_direct[i] *= change;
 		s->discretisation[i] *= change;
+		s->discretisation_direct[i] *= change;
 	}
 }
 

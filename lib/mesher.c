@@ -142,6 +142,16 @@ static void tell(const struct mesher_options *o, int stage)
 		o->progress->fn(o->progress->arg, stage, 4);
 }
 
+/* What follows when elements and patches are in order. */
+static int finish(struct model *m, struct mesher_report *r, struct err *e)
+{
+	if (model_derive(m, e) || outline_patches(m, &r->planar_patches, e) ||
+	    report_materials(m, r, e))
+		return -1;
+	report_patches(m, r);
+	return 0;
+}
+
 int mesher_run(struct model *m, const struct mesher_options *o, struct mesher_report *r,
                struct err *e)
 {
@@ -153,13 +163,105 @@ int mesher_run(struct model *m, const struct mesher_options *o, struct mesher_re
 	    subdivide(m, r->element_size, e))
 		return -1;
 	tell(o, 2);
-	if (make_patches(m, o, r, e) || model_derive(m, e))
+	if (make_patches(m, o, r, e))
 		return -1;
 	tell(o, 3);
-	if (outline_patches(m, &r->planar_patches, e) || report_materials(m, r, e))
+	return finish(m, r, e);
+}
+
+/* ---- refinement ---- */
+
+static int same_triangles(const struct model *a, const struct model *b)
+{
+	if (a->triangles != b->triangles || a->surface.n != b->surface.n)
+		return 0;
+	for (size_t t = 0; t < a->triangles; t++)
+		if (a->triangle_surface[t] != b->triangle_surface[t])
+			return 0;
+	for (size_t c = 0; c < 3 * a->triangles; c++)
+		for (size_t k = 0; k < 3; k++)
+			if (a->vertex[3 * (size_t)a->triangle[c] + k] !=
+			    b->vertex[3 * (size_t)b->triangle[c] + k])
+				return 0;
+	return 1;
+}
+
+/* Halvings. */
+struct plan {
+	uint8_t *element, *patch;
+};
+
+/* Gives m the vertices, elements and split trees of old. */
+static void take_division(struct model *m, struct model *old)
+{
+	free(m->vertex);
+	free(m->triangle);
+	m->vertices = old->vertices;
+	m->vertex = old->vertex;
+	m->triangle = old->triangle;
+	m->triangle_split = old->triangle_split;
+	m->splits = old->splits;
+	m->split = old->split;
+	m->elements = old->elements;
+	m->element = old->element;
+	m->element_triangle = old->element_triangle;
+	old->vertex = NULL;
+	old->triangle = old->element = old->element_triangle = NULL;
+	old->triangle_split = NULL;
+	old->split = NULL;
+}
+
+/* Divides m, which is as `old` was, by the plan. */
+static int divide_further(struct model *m, const struct mesher_options *o,
+                          const struct mesher_report *r, const struct model *old,
+                          const struct plan *plan, uint32_t **origin, struct err *e)
+{
+	double cos_cone = cos(o->normal_cone * acos(-1) / 180);
+	size_t patches;
+
+	if (subdivide_further(m, plan->element, origin, e))
 		return -1;
-	report_patches(m, r);
-	return 0;
+	uint32_t *before = mem_new(m->elements, sizeof *before, "patches", e);
+	uint32_t *patch = mem_new(m->elements, sizeof *patch, "patches", e);
+	for (size_t i = 0; before && i < m->elements; i++)
+		before[i] = old->element_patch[(*origin)[i]];
+	int status = before && patch &&
+	             !split_patches(m, r->patch_size, cos_cone, before, old->patches, plan->patch,
+	                            patch, &patches, e) &&
+	             !order_elements(m, patch, patches, *origin, e) ? 0 : -1;
+	free(before);
+	free(patch);
+	return status;
+}
+
+int mesher_refine(struct model *m, const struct mesher_options *o, struct model *old,
+                  const struct solution *s, const struct mesher_refinement *how,
+                  uint32_t **origin, struct mesher_report *r, struct err *e)
+{
+	*origin = NULL;
+	if (clean(m, r, e) || set_sizes(m, o, r, e) ||
+	    (!o->no_imprint && imprint(m, r->element_size, r, e)))
+		return -1;
+	if (!same_triangles(m, old))
+		return err_set(e, "the solution to refine has other triangles: the geometry, or an "
+		               "option of mesh, has changed since; make a mesh without --refine");
+	tell(o, 1);
+	r->elements_before = old->elements;
+	r->patches_before = old->patches;
+	struct plan plan = { mem_new(old->elements, 1, "elements", e),
+		             mem_new(old->patches, 1, "patches", e) };
+	int status = plan.element && plan.patch &&
+	             !adapt_plan(old, s, how, metres(how->smallest, r->diagonal), plan.element,
+	                         plan.patch, r, e) ? 0 : -1;
+	tell(o, 2);
+	if (!status) {
+		take_division(m, old);
+		status = divide_further(m, o, r, old, &plan, origin, e);
+	}
+	free(plan.element);
+	free(plan.patch);
+	tell(o, 3);
+	return status ? -1 : finish(m, r, e);
 }
 
 void mesher_report_free(struct mesher_report *r)

@@ -9,6 +9,7 @@
 
 #include "model.h"
 #include "par.h"
+#include "solution.h"
 
 /* A length in metres or, if relative, as a fraction of the diagonal of the
  * scene's bounding box; INFINITY = no bound. */
@@ -25,6 +26,15 @@ struct mesher_options {
 	                                patch may turn away from its mean normal */
 	int no_imprint;              /* 1: triangles are not cut where others touch them */
 	const struct progress *progress; /* or NULL */
+};
+
+/* Refinement goes on until the expected error is small enough, or the elements are so many
+ * or so small; in one step to a quarter of an element's edge at most. */
+struct mesher_refinement {
+	double error;                /* root mean square over all modelled sides of the error of
+	                                exitance, over the mean exitance */
+	struct mesher_size smallest; /* elements are not divided to shorter longest edges */
+	size_t elements;
 };
 
 /* What cleaning did to one surface. */
@@ -52,6 +62,13 @@ struct mesher_report {
 	uint32_t largest_patch;          /* elements in it */
 	double area_front, area_back;    /* of the modelled sides, m^2 */
 
+	/* Of mesher_refine. Errors as in struct mesher_refinement. */
+	size_t elements_before, patches_before;
+	size_t marked, patches_marked;   /* to be divided for their own sake */
+	size_t patches_for_lobes;        /* of these, for what lobes light */
+	double error_before, error_expected;
+	double patch_error_before;       /* the part of patches in error_before */
+
 	/* Pieces connected by edges, coincident edges of different surfaces taken
 	 * together. A piece is closed if each of its edges has two triangles. */
 	size_t components, closed_components;
@@ -66,6 +83,17 @@ struct mesher_report {
 /* 0, or -1 and e (m then is to be freed as it is). r must be zeroed. */
 int mesher_run(struct model *m, const struct mesher_options *o, struct mesher_report *r,
                struct err *e);
+
+/* The same from an earlier mesh and its solution: `old` becomes the division of m, with
+ * those elements halved that contribute most to the error that s states (s->discretisation),
+ * and those patches whose exitance differs too much from place to place for what is next to
+ * them, or for lobes that mirror them. Other patches stay as they were. m may have other
+ * materials and cameras than old, but its triangles, cleaned and cut as o says, must be the
+ * same. (*origin)[e] = element of old that element e is part of, to be freed in any case. old
+ * is used up. */
+int mesher_refine(struct model *m, const struct mesher_options *o, struct model *old,
+                  const struct solution *s, const struct mesher_refinement *how,
+                  uint32_t **origin, struct mesher_report *r, struct err *e);
 
 void mesher_report_free(struct mesher_report *r);
 

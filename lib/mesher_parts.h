@@ -76,6 +76,42 @@ int imprint(struct model *m, double size, struct mesher_report *r, struct err *e
  * together with all triangles that share it. */
 int subdivide(struct model *m, double size, struct err *e);
 
+/* Divides the elements of a model further, element i at least halvings[i] times, and its
+ * neighbours where no edge would otherwise be halved. Replaces vertices, elements and split
+ * trees; (*origin)[e] = the element that the new one was part of, to be freed. */
+int subdivide_further(struct model *m, const uint8_t *halvings, uint32_t **origin,
+                      struct err *e);
+
+/* adapt.c: how often each element and each patch is to be halved; fills what r says of it.
+ * `smallest` in metres. O(elements + patches log patches). */
+int adapt_plan(const struct model *m, const struct solution *s,
+               const struct mesher_refinement *how, double smallest, uint8_t *halvings,
+               uint8_t *patch_halvings, struct mesher_report *r, struct err *e);
+
+/* adapt_patches.c: the centroid of a patch and its mean front normal, unit. */
+struct patch_frame {
+	double centre[3], normal[3];
+};
+
+/* [patches], to be freed; NULL and e on failure. O(elements). */
+struct patch_frame *patch_frames(const struct model *m, struct err *e);
+
+/* Sum over a patch-side and over bands of squared deviations of its exitance from its mean,
+ * less what noise there is in them: in the square of exitance times area. */
+double patch_deviations(const struct model *m, const struct solution *s, uint32_t patch,
+                        int side);
+
+/* Adds to energy[patches] what the differences of exitance within a patch, which it shoots as
+ * if there were none, cost the surfaces next to it: in units of patch_deviations. 0, or -1
+ * and e. */
+int patch_energies(const struct model *m, const struct solution *s,
+                   const struct patch_frame *frame, double *energy, struct err *e);
+
+/* adapt_lobes.c: the same of what lobes of finite exponents light: they mirror a patch as if
+ * its exitance were everywhere the same. O(uneven patch-sides x patch-sides with lobes). */
+int lobe_energies(const struct model *m, const struct solution *s,
+                  const struct patch_frame *frame, double *energy, struct err *e);
+
 /* regions.c: sets region[t] of input triangles: connected pieces of one surface,
  * plane or bending by less than the cone at each edge. */
 struct region {
@@ -109,9 +145,20 @@ int merge_patches(const struct division *d, uint32_t *patch, size_t *count, stru
 int find_patches(const struct model *m, double size, double cos_cone, uint32_t *patch,
                  size_t *count, struct err *e);
 
+/* Halves earlier patches, old[element], so many times, but not to fewer than a few elements.
+ * The parts of a patch follow those of the patch before it. */
+int split_patches(const struct model *m, double size, double cos_cone, const uint32_t *old,
+                  size_t patches, const uint8_t *halvings, uint32_t *patch, size_t *count,
+                  struct err *e);
+
 /* order.c: renumbers patches, elements and vertices along a Morton curve over
  * the scene's box and fills the patch arrays. */
 int order_model(struct model *m, const uint32_t *patch, size_t patches, struct err *e);
+
+/* The same for patches that keep their numbers; origin[element] moves with the elements. */
+int order_elements(struct model *m, const uint32_t *patch, size_t patches, uint32_t *origin,
+                   struct err *e);
+
 
 /* outline.c: the loops of planar patches. Needs model_derive. */
 int outline_patches(struct model *m, size_t *planar, struct err *e);

@@ -65,6 +65,9 @@ static const struct facet *shape_of(struct cell *c)
 	return &c->shape.f;
 }
 
+/* Parts have no points kept. */
+static const struct clear_points none = { NULL, NULL };
+
 /* Settles a cell whose view is clear or hidden: 1. Otherwise narrows its blockers down. */
 static int settle(struct integral *in, struct cell *c, const struct facet *f)
 {
@@ -75,7 +78,7 @@ static int settle(struct integral *in, struct cell *c, const struct facet *f)
 	if (hidden)
 		return 1;
 	if (!c->blockers)
-		in->settled += clear_exchange(in->clear, f, NULL, in->g, NULL);
+		in->settled += clear_exchange(in->clear, f, none, in->g, none);
 	return !c->blockers;
 }
 
@@ -284,7 +287,7 @@ double occluded_exchange(struct occluded *o, struct clear *clear, const struct s
 	o->cell.n = 0;
 	uint64_t all = o->blockers ? UINT64_MAX >> (64 - o->blockers) : 0;
 	/* Cutting pays where more is asked for than cells across shadows' edges can tell. */
-	double whole = clear_exchange(clear, in.f, NULL, in.g, NULL);
+	double whole = clear_exchange(clear, in.f, none, in.g, none);
 	in.cut = tolerance < 2 * unseen * whole;
 	if (in.cut)
 		shadow_edges(o->seer.blocker, o->blockers, in.f, in.g, in.near, &in.shadows);

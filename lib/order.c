@@ -179,20 +179,52 @@ static int order_vertices(struct model *m, struct err *e)
 	return 0;
 }
 
+/* What the elements were made from goes with them. */
+static int move_origins(uint32_t *origin, const struct place *place, size_t n, struct err *e)
+{
+	uint32_t *moved = mem_new(n, sizeof *moved, "elements", e);
+
+	if (!moved)
+		return -1;
+	for (size_t i = 0; i < n; i++)
+		moved[i] = origin[place[i].old];
+	memcpy(origin, moved, n * sizeof *origin);
+	free(moved);
+	return 0;
+}
+
+static int order(struct model *m, const struct curve *c, const uint32_t *patch, size_t patches,
+                 const uint32_t *rank, uint32_t *origin, struct err *e)
+{
+	struct place *place = sort_elements(m, c, patch, rank, e);
+	int status = place && (!origin || !move_origins(origin, place, m->elements, e)) &&
+	             !move_elements(m, place, e) && !fill_patches(m, place, patches, e) &&
+	             !order_vertices(m, e) ? 0 : -1;
+
+	free(place);
+	return status;
+}
+
 int order_model(struct model *m, const uint32_t *patch, size_t patches, struct err *e)
 {
-	int status = -1;
 	struct curve c = scene_curve(m);
-	struct place *place = NULL;
+	uint32_t *rank = mem_new(patches, sizeof *rank, "patches", e);
+	int status = rank && !rank_patches(m, &c, patch, patches, rank, e) &&
+	             !order(m, &c, patch, patches, rank, NULL, e) ? 0 : -1;
+
+	free(rank);
+	return status;
+}
+
+int order_elements(struct model *m, const uint32_t *patch, size_t patches, uint32_t *origin,
+                   struct err *e)
+{
+	struct curve c = scene_curve(m);
 	uint32_t *rank = mem_new(patches, sizeof *rank, "patches", e);
 
-	if (!rank || rank_patches(m, &c, patch, patches, rank, e) ||
-	    !(place = sort_elements(m, &c, patch, rank, e)) || move_elements(m, place, e) ||
-	    fill_patches(m, place, patches, e))
-		goto done;
-	status = order_vertices(m, e);
-done:
+	for (size_t p = 0; rank && p < patches; p++)
+		rank[p] = (uint32_t)p;
+	int status = rank ? order(m, &c, patch, patches, rank, origin, e) : -1;
 	free(rank);
-	free(place);
 	return status;
 }

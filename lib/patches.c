@@ -10,11 +10,14 @@
 #include "mesher_parts.h"
 #include "vec3.h"
 
+enum { ELEMENTS_MIN = 4 }; /* of a patch that is halved, for each half */
+
 /* Connected elements order[begin, end) of a region and the box, in its frame, that
  * they stand for. The box is halved exactly; elements that straddle the cut belong
  * to the side of their centroid and do not widen it. */
 struct piece {
 	uint32_t begin, end, region;
+	uint32_t halvings;    /* that it is still to go through, whatever its size */
 	double lo[3], hi[3];
 };
 
@@ -130,6 +133,7 @@ static int cut(struct divider *d, const struct piece *p, int axis, double at)
 			d->order[n++] = d->order[i];
 	memcpy(d->order + n, d->queue + p->begin, (above - p->begin) * sizeof *d->order);
 	low.hi[axis] = high.lo[axis] = at;
+	low.halvings = high.halvings = p->halvings ? p->halvings - 1 : 0;
 	return push_connected(d, p->begin, n, &low) || push_connected(d, n, p->end, &high) ? -1 : 0;
 }
 
@@ -144,6 +148,17 @@ static int too_long(const struct divider *d, const struct piece *p)
 			longest = p->hi[k] - p->lo[k];
 			axis = k;
 		}
+	return axis;
+}
+
+/* The longest side of the box. */
+static int longest_axis(const struct piece *p)
+{
+	int axis = 0;
+
+	for (int k = 1; k < 3; k++)
+		if (p->hi[k] - p->lo[k] > (p->hi[axis] - p->lo[axis]) * (1 + 1e-6))
+			axis = k;
 	return axis;
 }
 
@@ -218,6 +233,24 @@ static int cut_bend(struct divider *d, const struct piece *p)
 	                                                                                      : 0;
 }
 
+/* The same for patches that there were, by their halvings. */
+static int divide_further(struct divider *d, uint32_t *patch, size_t *count)
+{
+	while (d->todo.n) {
+		struct piece p = ((struct piece *)d->todo.data)[--d->todo.n];
+		int axis = longest_axis(&p);
+		if (p.halvings && p.end - p.begin >= 2 * ELEMENTS_MIN) {
+			if (cut(d, &p, axis, .5 * (p.lo[axis] + p.hi[axis])))
+				return -1;
+			continue;
+		}
+		for (uint32_t i = p.begin; i < p.end; i++)
+			patch[d->order[i]] = (uint32_t)*count;
+		(*count)++;
+	}
+	return 0;
+}
+
 /* Works through the list; pieces that need no cut become patches. */
 static int divide(struct divider *d, uint32_t *patch, size_t *count)
 {
@@ -286,6 +319,34 @@ static int push_regions(struct divider *d, size_t regions)
 	return status;
 }
 
+/* Puts earlier patches on the list: order becomes the elements by patch. */
+static int push_patches(struct divider *d, const uint32_t *old, size_t patches,
+                        const uint8_t *halvings)
+{
+	size_t n = d->d.m->elements;
+	uint32_t *start = mem_new(patches + 2, sizeof *start, "patches", d->e);
+	int status = start ? 0 : -1;
+
+	for (size_t i = 0; start && i < n; i++)
+		start[old[i] + 2]++;
+	for (size_t p = 0; start && p < patches; p++)
+		start[p + 2] += start[p + 1];
+	for (size_t i = 0; start && i < n; i++)
+		d->order[start[old[i] + 1]++] = (uint32_t)i;
+	/* start[p] now is the beginning of patch p. */
+	for (size_t p = patches; !status && p-- > 0;) {
+		struct piece all = { .region = d->d.element_region[d->order[start[p]]],
+			             .halvings = halvings[p],
+			             .lo = { -INFINITY, -INFINITY, -INFINITY },
+			             .hi = { INFINITY, INFINITY, INFINITY } };
+		memcpy(d->queue + start[p], d->order + start[p],
+		       (start[p + 1] - start[p]) * sizeof *d->queue);
+		status = push_piece(d, start[p], start[p + 1], &all);
+	}
+	free(start);
+	return status;
+}
+
 /* Which regions the elements belong to. */
 static int assign_regions(struct divider *d, size_t *regions)
 {
@@ -348,6 +409,24 @@ int find_patches(const struct model *m, double size, double cos_cone, uint32_t *
 		goto done;
 	status = merge_patches(&d.d, patch, count, e);
 done:
+	release(&d);
+	return status;
+}
+
+int split_patches(const struct model *m, double size, double cos_cone, const uint32_t *old,
+                  size_t patches, const uint8_t *halvings, uint32_t *patch, size_t *count,
+                  struct err *e)
+{
+	int status = -1;
+	size_t regions;
+	struct divider d = { .d = { .m = m, .size = size, .cos_cone = cos_cone }, .e = e };
+
+	*count = 0;
+	if (!assign_regions(&d, &regions) && !allocate(&d)) {
+		element_centroids(&d.d);
+		status = push_patches(&d, old, patches, halvings) ||
+		         divide_further(&d, patch, count) ? -1 : 0;
+	}
 	release(&d);
 	return status;
 }

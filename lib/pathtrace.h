@@ -44,8 +44,8 @@ struct pathtrace_options {
  * sample has no standard error: no such channels, and infinity.
  * Next-event estimation of the area emitters with multiple importance sampling, and of
  * punctual lights, also straight through clear panes; light of these that comes by way of
- * mirrors to where it is scattered is missing (pathtrace_misses); ideal events are followed; Russian roulette
- * after a few bounces. O(pixels samples bounces log triangles). */
+ * mirrors to where it is scattered is missing (pathtrace_misses); ideal events are
+ * followed; Russian roulette after a few bounces. O(pixels samples bounces log triangles). */
 int pathtrace_picture(const struct pathtrace *p, const struct view_frame *f,
                       const struct pathtrace_options *o, const struct progress *progress,
                       struct image *picture, double *relative_error, struct err *e);

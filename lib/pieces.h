@@ -126,7 +126,8 @@ void flip_edge(struct cutter *c, uint32_t h);
 void flip_edges(struct cutter *c);
 
 /* refine.c: divides pieces of a triangle that are longer than `size`, and than 1/32 of the
- * triangle, until they have no angle below 20 degrees, where lines leave room for that. The triangle's pieces must be as flip_edges leaves them. */
+ * triangle, until they have no angle below 20 degrees, where lines leave room for that. The
+ * triangle's pieces must be as flip_edges leaves them. */
 int refine_triangle(struct cutter *c, uint32_t triangle, double size);
 
 #endif

@@ -25,15 +25,17 @@ static int solution_arrays(struct solution *s, const struct model *m,
 	s->caustic = mem_new(parts, bands * sizeof(double), "irradiance", e);
 	s->indirect = mem_new(parts, bands * sizeof(double), "irradiance", e);
 	s->error = mem_new(es, bands * sizeof(double), "irradiance", e);
+	s->error_direct = mem_new(es, bands * sizeof(double), "irradiance", e);
 	s->discretisation = mem_new(es, bands * sizeof(double), "irradiance", e);
+	s->discretisation_direct = mem_new(es, bands * sizeof(double), "irradiance", e);
 	s->unshot_emission = mem_new(s->sources, bands * sizeof(double), "unshot flux", e);
 	s->unshot_diffuse = mem_new(ps, channels * sizeof(double), "unshot flux", e);
 	s->unshot_link = mem_new(t->links, 2 * channels * sizeof(double), "unshot flux", e);
 	s->shot = mem_new(t->rows, 2 * channels * sizeof(double), "shot flux", e);
 	s->ledger = mem_new(LEDGER_TERMS, channels * sizeof(double), "ledger", e);
-	return s->direct && s->caustic && s->indirect && s->error && s->discretisation &&
-	       s->unshot_emission && s->unshot_diffuse && s->unshot_link && s->shot &&
-	       s->ledger ? 0 : -1;
+	return s->direct && s->caustic && s->indirect && s->error && s->error_direct &&
+	       s->discretisation && s->discretisation_direct && s->unshot_emission &&
+	       s->unshot_diffuse && s->unshot_link && s->shot && s->ledger ? 0 : -1;
 }
 
 int solution_begin(struct solution *s, const struct model *m, const struct transport *t,
@@ -159,7 +161,6 @@ static int is_slow(struct solver *v, double unshot, double stop)
 	round[ROUND_UNSHOT] = unshot;
 	return stop > 0 && log(unshot / stop) > WORTH * rate;
 }
-
 
 static void tell(const struct solver *v, const struct radiosity_hooks *hooks,
                  const struct radiosity_report *r)

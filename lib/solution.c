@@ -51,6 +51,9 @@ int solution_check(const struct model *m, const struct solution *s, struct err *
 	       check_numbers("irradiance_caustic", s->caustic, s->groups * sides, 0, e) ||
 	       check_numbers("irradiance_indirect", s->indirect, s->groups * sides, 0, e) ||
 	       check_numbers("irradiance_error", s->error, sides, 0, e) ||
+	       check_numbers("irradiance_error_direct", s->error_direct, sides, 0, e) ||
+	       check_numbers("irradiance_discretisation_direct", s->discretisation_direct, sides,
+	                     0, e) ||
 	       check_numbers("irradiance_discretisation", s->discretisation, sides, 0, e) ||
 	       check_numbers("unshot_emission", s->unshot_emission, s->sources * bands, 1,
 	                     e) ||
@@ -97,7 +100,8 @@ double solution_relative_rms(const struct model *m, const struct solution *s,
 
 void solution_free(struct solution *s)
 {
-	double *array[] = { s->direct, s->caustic, s->indirect, s->error, s->discretisation,
+	double *array[] = { s->direct, s->caustic, s->indirect, s->error, s->error_direct, s->discretisation,
+		s->discretisation_direct,
 		s->unshot_emission, s->unshot_diffuse, s->unshot_link, s->shot, s->ledger };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)

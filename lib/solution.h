@@ -26,8 +26,10 @@ struct solution {
 	double *indirect;          /* the rest */
 	double *error;             /* [2E][bands] standard error of their sum from
 	                              the form factors' sampling */
+	double *error_direct;      /* [2E][bands] what emitters' rows have in it */
 	double *discretisation;    /* [2E][bands] estimated root mean square, over the
 	                              element, of what interpolation misses of their sum */
+	double *discretisation_direct; /* [2E][bands] the same of light straight from emitters */
 
 	/* The solver's state, for shoot --resume: what is still to be shot, what each
 	 * row has sent so far, where the rest went. */

@@ -44,7 +44,6 @@ static int new_arrays(struct solver *v, struct err *e)
 	size_t parts = v->parts.n, vectors = v->sender.vectors, sides = v->s->patch_sides;
 
 	v->emitted = mem_new(parts * v->s->groups, sizeof *v->emitted, "priorities", e);
-	v->part = mem_new(parts * v->s->groups, sizeof *v->part, "priorities", e);
 	v->weight_max = mem_new(parts, sizeof *v->weight_max, "priorities", e);
 	v->priority = mem_new(sides, sizeof *v->priority, "priorities", e);
 	v->links = mem_new(sides, sizeof *v->links, "priorities", e);
@@ -53,6 +52,7 @@ static int new_arrays(struct solver *v, struct err *e)
 	v->emission = lanes_new(vectors, &v->room[2], "flux", e);
 	v->diffuse = lanes_new(vectors, &v->room[3], "flux", e);
 	v->unshot = lanes_new(vectors, &v->room[4], "flux", e);
+	v->part = lanes_new(parts * vectors, &v->room[5], "priorities", e);
 	return v->emitted && v->part && v->weight_max && v->priority && v->links && v->weight &&
 	       v->out && v->emission && v->diffuse && v->unshot ? 0 : -1;
 }
@@ -77,7 +77,6 @@ void solver_free(struct solver *v)
 	for (size_t i = 0; i < sizeof v->room / sizeof *v->room; i++)
 		free(v->room[i]);
 	free(v->emitted);
-	free(v->part);
 	free(v->weight_max);
 	free(v->priority);
 	free(v->links);
@@ -103,23 +102,38 @@ static void check_ledger(struct solver *v)
 }
 
 /* Counts unshot flux of a source; its magnitude by weight. */
-static double count(struct solver *v, uint32_t ps, const lanes *flux)
+static double count(struct solver *v, uint32_t source, const lanes *flux)
 {
-	size_t vectors = v->sender.vectors, bands = (size_t)v->s->bands;
-	const lanes *weight = v->weight + v->parts.of[ps] * vectors;
-	double *part = v->part + v->parts.of[ps] * v->s->groups, sum = 0;
+	const size_t vectors = v->sender.vectors;
+	const lanes *weight = v->weight + v->parts.of[source] * vectors;
+	lanes *part = v->part + v->parts.of[source] * vectors, sum = { 0 }, below = { 0 };
 
 	for (size_t i = 0; i < vectors; i++) {
 		lanes magnitude = lanes_abs(flux[i]), weighted = magnitude * weight[i];
 		v->unshot[i] += flux[i];
-		for (size_t c = i * LANES; c < (i + 1) * LANES && c < v->sender.channels; c++) {
-			part[c / bands] += weighted[c % LANES];
-			v->negative |= flux[i][c % LANES] < 0;
-		}
-		v->magnitude += lanes_total(&magnitude, 1);
-		sum += lanes_total(&weighted, 1);
+		part[i] += weighted;
+		sum += weighted;
+		below += magnitude - flux[i];
 	}
-	return sum;
+	v->negative |= lanes_total(&below, 1) > 0;
+	return lanes_total(&sum, 1);
+}
+
+/* The most that a component has unshot of a group, over what it emits of it. */
+static double worst_part(const struct solver *v)
+{
+	const size_t bands = (size_t)v->s->bands;
+	double worst = 0;
+
+	for (size_t i = 0; i < v->parts.n; i++)
+		for (size_t g = 0; g < v->s->groups; g++) {
+			const double *part = (double *)(v->part + i * v->sender.vectors) + g * bands;
+			double sum = 0;
+			for (size_t k = 0; k < bands; k++)
+				sum += part[k];
+			worst = fmax(worst, sum);
+		}
+	return worst;
 }
 
 static void load_emission(const struct solver *v, uint32_t source, lanes *to)
@@ -138,8 +152,8 @@ double solver_survey(struct solver *v, double *worst)
 	double top = 0;
 
 	memset(v->unshot, 0, vectors * sizeof *v->unshot);
-	memset(v->part, 0, v->parts.n * v->s->groups * sizeof *v->part);
-	v->magnitude = v->negative = 0;
+	memset(v->part, 0, v->parts.n * vectors * sizeof *v->part);
+	v->negative = 0;
 	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++) {
 		const uint64_t *first = v->t->target_link + ps;
 		v->links[ps] = s->link_gain[ps] = 0;
@@ -154,9 +168,7 @@ double solver_survey(struct solver *v, double *worst)
 		load_emission(v, i, v->emission);
 		count(v, i, v->emission);
 	}
-	*worst = 0;
-	for (size_t i = 0; i < v->parts.n * v->s->groups; i++)
-		*worst = fmax(*worst, v->part[i]);
+	*worst = worst_part(v);
 	check_ledger(v);
 	return top;
 }

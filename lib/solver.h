@@ -22,13 +22,12 @@ struct solver {
 	double *weight_max;      /* [components] the largest */
 	double *priority;        /* [2P] unshot flux by weight when the round began */
 	double *links;           /* [2P] its part of a side's links */
-	double *part;            /* [components][groups] unshot flux by weight */
+	lanes *part;             /* [components][vectors] unshot flux by weight */
 	lanes *unshot;           /* [vectors] in all, then */
-	double magnitude;        /* sum of its absolute values */
 	int negative;            /* some of it is below 0 */
 	size_t sides;            /* that can shoot */
 	double guessed, residual;
-	void *room[5];           /* memory of the vectors */
+	void *room[6];           /* memory of the vectors */
 };
 
 /* 0, or -1 and e; to be freed either way. */
@@ -39,7 +38,7 @@ void solver_free(struct solver *v);
 /* Flux that a source emits. */
 double solver_emitted(const struct model *m, uint32_t source, int band);
 
-/* Looks at all unshot flux: priority, links, unshot, magnitude, negative. Returns the
+/* Looks at all unshot flux: priority, links, unshot, negative. Returns the
  * largest priority; the worst component's and group's unshot over emitted flux goes to
  * *worst. Checks the ledger. O(sides + links). */
 double solver_survey(struct solver *v, double *worst);
@@ -60,7 +59,7 @@ void solver_lobe_shares(const struct solver *v, uint32_t ps, lanes *share);
 /* Books v->sent in the ledger, where `out` was taken from unshot flux. */
 void solver_book(struct solver *v, const lanes *out);
 
-/* Brings unshot / emitted of every component and group to `stop` or near it: GMRES for
+/* Brings unshot / emitted of every component and group well below `stop`: GMRES for
  * what is still to be sent, and one shot of that by all sides. 1 if it made less of it,
  * 0 if it did not, -1 and e. O(passes x runs). */
 int solver_overshoot(struct solver *v, double worst, double stop, struct err *e);

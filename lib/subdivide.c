@@ -1,7 +1,7 @@
 /* Conforming subdivision by longest-edge bisection (Rivara 1984), driven by the
- * edges: the longest edge is halved in all triangles that share it, so no vertex
- * ever lies inside an edge, and as it is the longest edge of each of them, angles
- * stay bounded. O(n log n) for n elements. */
+ * edges: an edge is halved in all triangles that share it, so no vertex ever lies
+ * inside an edge, and it is the longest edge of each of them, so angles stay bounded.
+ * O(n log n) for n elements. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,12 +21,15 @@ struct leaf {
 	uint32_t v[3], edge[3], next[3], prev[3];
 	uint32_t triangle;
 	int32_t parent;        /* 2 split + child, or -1: the root of the triangle */
+	uint32_t origin;       /* what it is part of: a triangle, or an earlier element */
+	uint8_t halvings;      /* that it is still to go through, whatever its size */
 };
 
 struct side {
 	uint32_t lo, hi;       /* vertices */
-	uint32_t head;         /* first half-edge */
+	uint32_t head;         /* first half-edge, or NONE: it has been halved */
 	double length;         /* squared, coarse */
+	int queued;
 };
 
 struct work {
@@ -59,6 +62,9 @@ static int before(struct work *w, uint32_t i, uint32_t j)
 
 static int heap_push(struct work *w, uint32_t side)
 {
+	if (side_at(w, side)->queued)
+		return 0;
+	side_at(w, side)->queued = 1;
 	if (vec_append(&w->heap, &side, 1, sizeof side, w->e))
 		return -1;
 	uint32_t *h = w->heap.data;
@@ -86,19 +92,38 @@ static uint32_t heap_pop(struct work *w)
 	return top;
 }
 
-/* A new side between two vertices, queued if it is too long. */
+/* A new side between two vertices. */
 static int add_side(struct work *w, uint32_t a, uint32_t b, uint32_t *out)
 {
 	const double *x = w->vertex.data;
-	struct side s = { a < b ? a : b, a < b ? b : a, NONE, 0 };
+	struct side s = { a < b ? a : b, a < b ? b : a, NONE, 0, 0 };
 	double d[3];
 
 	v3_sub(&x[3 * (size_t)b], &x[3 * (size_t)a], d);
 	s.length = coarse(v3_dot(d, d));
 	*out = (uint32_t)w->side.n;
-	if (vec_append(&w->side, &s, 1, sizeof s, w->e))
-		return -1;
-	return s.length > w->limit ? heap_push(w, *out) : 0;
+	return vec_append(&w->side, &s, 1, sizeof s, w->e);
+}
+
+/* The side of leaf i that is to be halved first. */
+static uint32_t longest_side(struct work *w, uint32_t i)
+{
+	const uint32_t *edge = leaf_of(w, 3 * i)->edge;
+	uint32_t longest = edge[0];
+
+	for (int k = 1; k < 3; k++)
+		if (before(w, edge[k], longest))
+			longest = edge[k];
+	return longest;
+}
+
+/* Queues the longest side of leaf i if the leaf is to be divided. */
+static int queue_leaf(struct work *w, uint32_t i)
+{
+	uint32_t side = longest_side(w, i);
+
+	return leaf_of(w, 3 * i)->halvings || side_at(w, side)->length > w->limit
+	           ? heap_push(w, side) : 0;
 }
 
 /* Puts half-edge h at the head of a side's list. */
@@ -153,6 +178,7 @@ static int halve_leaf(struct work *w, uint32_t h, uint32_t mid, const uint32_t h
 	int k = (int)(h % 3), k1 = (k + 1) % 3, k2 = (k + 2) % 3;
 	uint32_t i = h / 3, j = (uint32_t)w->leaf.n, cut;
 	struct leaf new = *leaf_of(w, h);
+	new.halvings = (uint8_t)(new.halvings - (new.halvings > 0));
 	int swapped = new.v[k] > new.v[k1];
 	uint32_t far = new.edge[k1];
 
@@ -165,13 +191,14 @@ static int halve_leaf(struct work *w, uint32_t h, uint32_t mid, const uint32_t h
 	new.v[k] = mid;
 	if (vec_append(&w->leaf, &new, 1, sizeof new, w->e))
 		return -1;
-	((struct leaf *)w->leaf.data)[i].v[k1] = mid;
+	leaf_of(w, 3 * i)->v[k1] = mid;
+	leaf_of(w, 3 * i)->halvings = new.halvings;
 	link_half(w, 3 * i + (uint32_t)k, half[swapped]);
 	link_half(w, 3 * i + (uint32_t)k1, cut);
 	link_half(w, 3 * j + (uint32_t)k, half[!swapped]);
 	link_half(w, 3 * j + (uint32_t)k1, far);
 	link_half(w, 3 * j + (uint32_t)k2, cut);
-	return record_split(w, i, j, k);
+	return record_split(w, i, j, k) || queue_leaf(w, i) || queue_leaf(w, j) ? -1 : 0;
 }
 
 static int halve_side(struct work *w, uint32_t side)
@@ -186,6 +213,7 @@ static int halve_side(struct work *w, uint32_t side)
 	if (vec_append(&w->vertex, at, 1, sizeof at, w->e) ||
 	    add_side(w, s.lo, mid, &half[0]) || add_side(w, mid, s.hi, &half[1]))
 		return -1;
+	side_at(w, side)->head = NONE;
 	for (uint32_t h = s.head, next; h != NONE; h = next) {
 		next = leaf_of(w, h)->next[h % 3];
 		if (halve_leaf(w, h, mid, half))
@@ -194,56 +222,137 @@ static int halve_side(struct work *w, uint32_t side)
 	return 0;
 }
 
-/* The input triangles as leaves, their edges as sides. */
-static int begin(struct work *w)
+/* Leaves with these corners, their edges as sides. leaf[i].origin = i. */
+static int begin(struct work *w, const uint32_t *corner, size_t leaves, const uint32_t *triangle,
+                 const uint8_t *halvings)
 {
 	struct model *m = w->m;
 	struct edges g;
 	uint32_t side;
 
-	m->triangle_split = mem_new(m->triangles, sizeof *m->triangle_split, "split trees",
-	                            w->e);
-	if (!m->triangle_split || edges_build(&g, m->triangle, m->triangles, m->vertices, w->e))
+	if (edges_build(&g, corner, leaves, m->vertices, w->e))
 		return -1;
 	int status = vec_append(&w->vertex, m->vertex, m->vertices, 3 * sizeof(double), w->e);
-	for (size_t t = 0; !status && t < m->triangles; t++) {
-		struct leaf l = { .triangle = (uint32_t)t, .parent = -1 };
-		memcpy(l.v, &m->triangle[3 * t], sizeof l.v);
-		m->triangle_split[t] = ~(int32_t)t;
+	for (uint32_t i = 0; !status && i < leaves; i++) {
+		struct leaf l = { .triangle = triangle ? triangle[i] : i, .parent = -1,
+			          .origin = i, .halvings = halvings ? halvings[i] : 0 };
+		memcpy(l.v, &corner[3 * (size_t)i], sizeof l.v);
 		status = vec_append(&w->leaf, &l, 1, sizeof l, w->e);
 	}
 	for (size_t i = 0; !status && i < g.n; i++) {
 		uint32_t h = g.use[g.start[i]];
-		status = add_side(w, half_from(m->triangle, h), half_to(m->triangle, h), &side);
+		status = add_side(w, half_from(corner, h), half_to(corner, h), &side);
 		for (uint32_t u = g.start[i]; !status && u < g.start[i + 1]; u++)
 			link_half(w, g.use[u], side);
 	}
 	edges_free(&g);
+	for (uint32_t i = 0; !status && i < leaves; i++)
+		status = queue_leaf(w, i);
 	return status;
 }
 
+/* The input triangles are leaves, and roots of trees. */
+static int begin_triangles(struct work *w)
+{
+	struct model *m = w->m;
+
+	m->triangle_split = mem_new(m->triangles, sizeof *m->triangle_split, "split trees",
+	                            w->e);
+	for (size_t t = 0; m->triangle_split && t < m->triangles; t++)
+		m->triangle_split[t] = ~(int32_t)t;
+	return m->triangle_split ? begin(w, m->triangle, m->triangles, NULL, NULL) : -1;
+}
+
+/* The elements are leaves of the trees that there are. */
+static int begin_elements(struct work *w, const uint8_t *halvings)
+{
+	struct model *m = w->m;
+
+	if (begin(w, m->element, m->elements, m->element_triangle, halvings) ||
+	    vec_append(&w->split, m->split, m->splits, sizeof *m->split, w->e))
+		return -1;
+	for (size_t i = 0; i < 2 * m->splits; i++) {
+		int32_t child = m->split[i / 2].child[i % 2];
+		if (child < 0)
+			leaf_of(w, 3 * (uint32_t)~child)->parent = (int32_t)i;
+	}
+	return 0;
+}
+
+/* The queued side to be halved next: the longest of all leaves that have it. Where a leaf
+ * has a longer one, that comes first (Rivara's longest-edge propagation path). */
+static int next_side(struct work *w, uint32_t *side)
+{
+	while (w->heap.n) {
+		uint32_t first = *(uint32_t *)w->heap.data, longest = first;
+		for (uint32_t h = side_at(w, first)->head; h != NONE; h = leaf_of(w, h)->next[h % 3]) {
+			uint32_t other = longest_side(w, h / 3);
+			if (before(w, other, longest))
+				longest = other;
+		}
+		if (longest != first) {
+			if (heap_push(w, longest))
+				return -1;
+			continue;
+		}
+		heap_pop(w);
+		if (side_at(w, first)->head != NONE) {
+			*side = first;
+			return 1;
+		}
+	}
+	return 0;
+}
+
+static int halve_all(struct work *w)
+{
+	uint32_t side;
+	int more;
+
+	while ((more = next_side(w, &side)) > 0)
+		if (halve_side(w, side))
+			return -1;
+	return more;
+}
+
 /* Leaves become elements. */
-static int finish(struct work *w)
+static int finish(struct work *w, uint32_t *origin)
 {
 	struct model *m = w->m;
 	const struct leaf *l = w->leaf.data;
+	uint32_t *element = mem_new(w->leaf.n, 3 * sizeof *element, "elements", w->e);
+	uint32_t *triangle = mem_new(w->leaf.n, sizeof *triangle, "elements", w->e);
 
-	m->element = mem_new(w->leaf.n, 3 * sizeof *m->element, "elements", w->e);
-	m->element_triangle = mem_new(w->leaf.n, sizeof *m->element_triangle, "elements", w->e);
-	if (!m->element || !m->element_triangle)
+	free(m->element);
+	free(m->element_triangle);
+	m->element = element;
+	m->element_triangle = triangle;
+	if (!element || !triangle)
 		return -1;
 	m->elements = w->leaf.n;
 	for (size_t i = 0; i < m->elements; i++) {
-		memcpy(&m->element[3 * i], l[i].v, sizeof l[i].v);
-		m->element_triangle[i] = l[i].triangle;
+		memcpy(&element[3 * i], l[i].v, sizeof l[i].v);
+		triangle[i] = l[i].triangle;
+		if (origin)
+			origin[i] = l[i].origin;
 	}
 	free(m->vertex);
+	free(m->split);
 	m->vertex = w->vertex.data;
 	m->vertices = w->vertex.n;
 	m->split = w->split.data;
 	m->splits = w->split.n;
 	w->vertex.data = w->split.data = NULL;
 	return 0;
+}
+
+static void release(struct work *w)
+{
+	free(w->vertex.data);
+	free(w->leaf.data);
+	free(w->side.data);
+	free(w->split.data);
+	free(w->heap.data);
 }
 
 int check_element_size(const struct model *m, double size, struct err *e)
@@ -265,19 +374,21 @@ int check_element_size(const struct model *m, double size, struct err *e)
 
 int subdivide(struct model *m, double size, struct err *e)
 {
-	struct work w = { .m = m, .e = e };
-	int status;
+	struct work w = { .m = m, .e = e, .limit = size * size * (1 + 1e-8) };
+	int status = begin_triangles(&w) || halve_all(&w) || finish(&w, NULL) ? -1 : 0;
 
-	w.limit = size * size * (1 + 1e-8);
-	status = begin(&w);
-	while (!status && w.heap.n)
-		status = halve_side(&w, heap_pop(&w));
-	if (!status)
-		status = finish(&w);
-	free(w.vertex.data);
-	free(w.leaf.data);
-	free(w.side.data);
-	free(w.split.data);
-	free(w.heap.data);
-	return status ? -1 : 0;
+	release(&w);
+	return status;
+}
+
+int subdivide_further(struct model *m, const uint8_t *halvings, uint32_t **origin,
+                      struct err *e)
+{
+	struct work w = { .m = m, .e = e, .limit = INFINITY };
+	int status = begin_elements(&w, halvings) || halve_all(&w) ? -1 : 0;
+
+	*origin = status ? NULL : mem_new(w.leaf.n, sizeof **origin, "elements", e);
+	status = *origin ? finish(&w, *origin) : -1;
+	release(&w);
+	return status;
 }

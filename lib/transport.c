@@ -6,6 +6,7 @@
 #include "bsdf.h"
 #include "lanes.h"
 #include "par.h"
+#include "transport_links.h"
 
 static const char what[] = "form factors by patch";
 
@@ -134,106 +135,6 @@ static void put_rows(struct transport *t, uint32_t shard, const uint32_t *chain,
 		t->block[block + b] = (struct block){ .chain = chain[f->block_chain[b]],
 			.shard = shard, .local = b, .escape = f->block_escape[b], .black = f->block_black[b],
 			.lost = f->block_lost[b], .cut = f->block_cut[b] };
-}
-
-/* ---- links ---- */
-
-struct link_key {
-	uint32_t target, source, last, chain, row[2];
-	float direction[3];
-};
-
-static int by_link(const void *a, const void *b)
-{
-	const struct link_key *x = a, *y = b;
-	if (x->target != y->target)
-		return x->target < y->target ? -1 : 1;
-	if (x->chain != y->chain)
-		return x->chain < y->chain ? -1 : 1;
-	if (x->source != y->source)
-		return x->source < y->source ? -1 : 1;
-	return (x->row[0] > y->row[0]) - (x->row[0] < y->row[0]);
-}
-
-static void put_links(const struct ff *f, const uint32_t *chain, uint32_t row,
-                      struct link_key *to)
-{
-	for (size_t i = 0; i < f->links; i++) {
-		to[i] = (struct link_key){ f->link_target[i], f->link_source[i], f->link_last[i],
-		                           chain[f->link_chain[i]], { FF_NO_ROW, FF_NO_ROW }, { 0 } };
-		for (int k = 0; k < 2; k++)
-			if (f->link_row[2 * i + (size_t)k] != FF_NO_ROW)
-				to[i].row[k] = row + f->link_row[2 * i + (size_t)k];
-		memcpy(to[i].direction, &f->link_direction[3 * i], sizeof to[i].direction);
-	}
-}
-
-static void sort_links(struct transport *t, struct link_key *l)
-{
-	size_t i = 0;
-
-	if (t->links)
-		qsort(l, t->links, sizeof *l, by_link);
-	for (uint32_t ps = 0; ps < 2 * t->m->patches; ps++) {
-		t->target_link[ps] = i;
-		while (i < t->links && l[i].target == ps)
-			i++;
-	}
-	t->target_link[2 * t->m->patches] = i;
-	for (i = 0; i < t->links; i++) {
-		t->link_target[i] = l[i].target;
-		memcpy(&t->link_row[2 * i], l[i].row, sizeof l[i].row);
-	}
-}
-
-static const float *arrival(const struct ff *f, size_t block, uint32_t target)
-{
-	for (uint64_t i = f->block_arrival[block]; i < f->block_arrival[block + 1]; i++)
-		if (f->arrival_target[i] == target)
-			return &f->arrival_direction[3 * i];
-	return NULL;
-}
-
-/* The link that looks nearest to where the light of a block comes from. */
-static uint32_t nearest_link(const struct transport *t, const struct link_key *l,
-                             const struct block *block, uint32_t target)
-{
-	const float *from = arrival(t->shard[block->shard], block->local, target);
-	size_t begin = t->target_link[target], end = t->target_link[target + 1], found = begin;
-	float best = -2;
-
-	for (size_t i = begin; i < end; i++) {
-		const float *d = l[i].direction;
-		float c = from ? d[0] * from[0] + d[1] * from[1] + d[2] * from[2] : 0;
-		if (c > best) {
-			best = c;
-			found = i;
-		}
-	}
-	return found < end ? (uint32_t)found | RUN_GUESSED : FF_NO_ROW;
-}
-
-/* The link for light of a source and chain, or the nearest. */
-static uint32_t find_link(const struct transport *t, const struct link_key *l,
-                          const struct block *block, uint32_t target, uint32_t source)
-{
-	size_t lo = t->target_link[target], hi = t->target_link[target + 1];
-	uint32_t chain = block->chain;
-	struct link_key want = { .target = target, .source = source, .chain = chain,
-	                         .row = { UINT32_MAX, 0 } };
-
-	/* The last link that does not begin beyond the source. */
-	for (size_t n = lo; n < hi;) {
-		size_t mid = n + (hi - n) / 2;
-		if (by_link(&l[mid], &want) <= 0)
-			n = mid + 1;
-		else
-			hi = mid;
-	}
-	if (hi > lo && l[hi - 1].chain == chain && l[hi - 1].source <= source &&
-	    l[hi - 1].last >= source)
-		return (uint32_t)(hi - 1);
-	return nearest_link(t, l, block, target);
 }
 
 /* ---- runs ---- */
@@ -430,7 +331,7 @@ static void fill_block(const struct pass *p, const struct row_chains *c, struct 
 			t->run_link[block->link + (at - block->special)] =
 				follows_lobe(t, c, block, r.target[i])
 					? RUN_FOLLOWED
-					: find_link(t, p->link, block, r.target[i], source);
+					: transport_find_link(t, p->link, block, r.target[i], source);
 	}
 }
 
@@ -487,7 +388,7 @@ static int join(struct transport *t, int threads, struct err *e)
 		if ((bad = !chain))
 			break;
 		put_rows(t, i, chain, row, block);
-		put_links(t->shard[i], chain, (uint32_t)row, l + link);
+		transport_put_links(t->shard[i], chain, (uint32_t)row, (uint32_t)link, l + link);
 		row += t->shard[i]->rows;
 		block += t->shard[i]->blocks;
 		link += t->shard[i]->links;
@@ -499,7 +400,7 @@ static int join(struct transport *t, int threads, struct err *e)
 			              t->m->light.name[i]);
 	if (!bad) {
 		chains_tie(&t->chains);
-		sort_links(t, l);
+		transport_sort_links(t, l);
 		bad = make_runs(t, l, threads, e);
 	}
 	free(l);
@@ -521,8 +422,8 @@ int transport_init(struct transport *t, const struct model *m, const struct ff *
 void transport_free(struct transport *t)
 {
 	void *array[] = { t->row_side, t->row_kind, t->row_samples, t->row_block,
-		t->diffuse_row, t->emission_row, t->light_row, t->block, t->run_target, t->run_sum, t->run_link,
-		t->link_target, t->link_row, t->target_link };
+		t->diffuse_row, t->emission_row, t->light_row, t->block, t->run_target, t->run_sum,
+		t->run_link, t->link_target, t->link_row, t->target_link };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);

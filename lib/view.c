@@ -16,8 +16,9 @@ enum {
 	SUMS = 6    /* arrays of view_sums */
 };
 
-/* That shadow rays aim at, relative to direct light, where no error is asked for. */
-static const double usual_error = .03;
+/* That shadow rays aim at, relative to the direct light of a pixel, where no error is asked
+ * for. */
+static const double usual_error = .1;
 
 /* Variance of the mean of n samples that are stratified over a pixel over that of samples
  * which are not, divided by sqrt(n). Measured at edges, with 2 to 16 samples. */
@@ -379,7 +380,8 @@ static int new_worker(const struct render *r, struct worker *k, int thread, stru
 		return -1;
 	if (r->v->method == VIEW_MESH)
 		return 0;
-	double relative = r->o->relative > 0 ? r->o->relative / 2 : usual_error;
+	double relative = r->o->relative > 0 ? r->o->relative / 2
+	                                     : fmin(1, usual_error * sqrt(r->o->samples));
 	return view_shader_init(&k->shader, r->v, r->gather, relative, thread, e);
 }
 

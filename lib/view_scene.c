@@ -118,8 +118,11 @@ static int part_solution(const struct solution *s, unsigned parts, struct soluti
 				(*to[p])[i] += from[p][g * n + i];
 	}
 	out->error = mem_new(n, sizeof *out->error, "errors", e);
+	out->error_direct = mem_new(n, sizeof *out->error_direct, "errors", e);
 	out->discretisation = mem_new(n, sizeof *out->discretisation, "errors", e);
-	return out->error && out->discretisation ? 0 : -1;
+	out->discretisation_direct = mem_new(n, sizeof *out->discretisation, "errors", e);
+	return out->error && out->error_direct && out->discretisation &&
+	       out->discretisation_direct ? 0 : -1;
 }
 
 /* The errors of the parts that are interpolated: noise, which light straight from emitters
@@ -137,6 +140,8 @@ static int part_errors(const struct view_scene *v, const struct solution *s, int
 		for (size_t g = 0; g < s->groups && parts == PART_CAUSTIC; g++)
 			all += s->direct[g * n + i] + s->indirect[g * n + i];
 		some->error[i] = all > 0 ? s->error[i] * h / all : 0;
+		if (s->error_direct && parts & PART_DIRECT)
+			some->error_direct[i] = s->error_direct[i];
 	}
 	return discretisation_estimate(v->m, some, threads, e);
 }

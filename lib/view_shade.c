@@ -62,10 +62,11 @@ static void shade(struct view_shader *s, size_t request, int side, const struct 
 	const double *part = side == q->side ? seen->here : seen->across;
 	double *light = (q->directional ? to->directional : to->diffuse) + q->slot * bands;
 	double *square = to->square + q->slot * bands;
-	double h[BANDS_MAX], error[BANDS_MAX];
+	double h[BANDS_MAX], error[BANDS_MAX], other[BANDS_MAX];
 
+	reconstruction_at(s->gather ? &s->v->all : &s->v->part, q->element, side, q->w, other);
 	direct_begin(s->direct, 2 * q->element + (uint32_t)side);
-	if (direct_at(s->direct, q->x, q->seed, s->relative, h, error, &s->e))
+	if (direct_at(s->direct, q->x, q->seed, s->relative, other, h, error, &s->e))
 		return;
 	for (size_t b = 0; b < bands; b++) {
 		double off = weight[b] * part[b] * error[b];

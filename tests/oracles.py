@@ -111,7 +111,7 @@ PARTICLES = {"*rho0.999": 40000, "facing_mirrors_*": 400000, "sphere_two_materia
 # Independent runs of the yardstick, and what widens their spread so that normal quantiles
 # up to 4 are at least Student's of so many runs.
 SEEDS, STUDENT = 32, 1.2
-VIEW = ["-s", "64x64", "--samples", "1", "--compression", "none"]
+VIEW = ["-d", "mesh", "-s", "64x64", "--samples", "1", "--compression", "none"]
 
 REFLECTED = 2  # row_kind of lobes about the mirror direction, ff(5)
 

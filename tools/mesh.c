@@ -10,13 +10,15 @@
 #include "../formats/gltf_file.h"
 #include "../formats/history.h"
 #include "../formats/mesh_file.h"
+#include "../formats/rad_file.h"
 #include "../lib/mesher.h"
 #include "common/cli.h"
 
 #define FORMAT "twopass.mesh"
 
 enum { OPT_CONE = 256, OPT_DIRECTIONAL, OPT_EXPONENT, OPT_LOBE, OPT_BANDS, OPT_CLAMP,
-       OPT_NO_IMPRINT };
+       OPT_NO_IMPRINT, OPT_REFINE, OPT_REFINE_ERROR, OPT_REFINE_SMALLEST,
+       OPT_REFINE_ELEMENTS };
 
 static const struct cli_option options[] = {
 	{ 'o', "output", "FILE", "write the mesh to FILE (.mesh; - is standard output)" },
@@ -29,12 +31,18 @@ static const struct cli_option options[] = {
 	{ OPT_LOBE, "lobe", "KIND", "what exponents mean: paper (default) or reciprocal" },
 	{ OPT_BANDS, "bands", "N", "number of bands (default: 1 for a grey scene, else 3)" },
 	{ OPT_CLAMP, "clamp", NULL, "rescale materials that return more than they receive" },
+	{ OPT_REFINE, "refine", "FILE.rad", "divide the mesh of an earlier solution further where it is in error" },
+	{ OPT_REFINE_ERROR, "refine-error", "X", "until its relative error is X (default .02)" },
+	{ OPT_REFINE_SMALLEST, "refine-smallest", "SIZE", "but no element to a shorter longest edge (default .25%)" },
+	{ OPT_REFINE_ELEMENTS, "refine-elements", "N", "and to about N elements at most (default 1000000)" },
 	{ 0, NULL, NULL, NULL }
 };
 
 struct request {
 	const char *scene, *output;
 	struct mesher_options mesher;
+	const char *solution;            /* to refine, or NULL */
+	struct mesher_refinement refine;
 	struct gltf_options gltf;
 };
 
@@ -45,6 +53,10 @@ struct job {
 	struct gltf_report gltf;
 	struct mesher_report mesher;
 	struct cache_info info;
+	struct model old;                /* of the solution to refine */
+	struct solution s;
+	struct cache_info old_info;
+	uint32_t *origin;                /* [elements] in the old model */
 };
 
 /* A length in metres, in percent of the scene, or `inf`. */
@@ -76,8 +88,9 @@ static enum lobe_kind parse_lobe(const struct cli *c, const char *text)
 
 static void parse(struct cli *c, int argc, char **argv, struct request *r)
 {
-	int letter;
+	int letter, refines = 0;
 
+	r->refine = (struct mesher_refinement){ .02, { .0025, 1 }, 1000000 };
 	r->mesher = (struct mesher_options){ .patch = { .05, 1 }, .element = { .04, 1 },
 		                             .element_within_patch = 1, .normal_cone = 20 };
 	r->gltf = GLTF_OPTIONS_DEFAULT;
@@ -93,6 +106,20 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 			r->mesher.normal_cone = cli_number(c, "--normal-cone", optarg, 0, 80);
 			break;
 		case OPT_NO_IMPRINT: r->mesher.no_imprint = 1; break;
+		case OPT_REFINE: r->solution = optarg; break;
+		case OPT_REFINE_ERROR:
+			r->refine.error = cli_number(c, "--refine-error", optarg, 0, INFINITY);
+			refines = 1;
+			break;
+		case OPT_REFINE_SMALLEST:
+			r->refine.smallest = parse_size(c, "--refine-smallest", optarg);
+			refines = 1;
+			break;
+		case OPT_REFINE_ELEMENTS:
+			r->refine.elements = (size_t)cli_integer(c, "--refine-elements", optarg, 1,
+			                                         1 << 28);
+			refines = 1;
+			break;
 		case OPT_DIRECTIONAL:
 			r->gltf.min_directional = cli_number(c, "--min-directional", optarg, 0, 1);
 			break;
@@ -110,6 +137,8 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		cli_usage(c, "one glTF file is needed");
 	if (!r->output)
 		cli_usage(c, "an output is needed: -o FILE.mesh");
+	if (refines && !r->solution)
+		cli_usage(c, "--refine-error, -smallest and -elements need --refine FILE.rad");
 	r->scene = argv[optind];
 }
 
@@ -139,7 +168,7 @@ static json_t *size_json(struct mesher_size s)
 
 static char *options_text(const struct request *r, struct err *e)
 {
-	return dump(json_pack("{s:o, s:o, s:b, s:f, s:b, s:f, s:o, s:s, s:i, s:b}",
+	json_t *o = json_pack("{s:o, s:o, s:b, s:f, s:b, s:f, s:o, s:s, s:i, s:b}",
 	                      "patch_size", size_json(r->mesher.patch),
 	                      "element_size", size_json(r->mesher.element),
 	                      "element_within_patch", r->mesher.element_within_patch,
@@ -148,7 +177,14 @@ static char *options_text(const struct request *r, struct err *e)
 	                      "min_directional", r->gltf.min_directional,
 	                      "min_exponent", length_json(r->gltf.min_exponent),
 	                      "lobe", r->gltf.lobe == LOBE_PAPER ? "paper" : "reciprocal",
-	                      "bands", r->gltf.bands, "clamp", r->gltf.clamp), e);
+	                      "bands", r->gltf.bands, "clamp", r->gltf.clamp);
+
+	if (r->solution)
+		json_object_update_new(o, json_pack("{s:f, s:o, s:I}", "refine_error", r->refine.error,
+		                                    "refine_smallest", size_json(r->refine.smallest),
+		                                    "refine_elements",
+		                                    (json_int_t)r->refine.elements));
+	return dump(o, e);
 }
 
 static json_t *notes_json(const struct gltf_report *r)
@@ -204,11 +240,22 @@ static json_t *pieces_json(const struct mesher_report *r)
 	                 "crowded_edges", (json_int_t)r->crowded_edges);
 }
 
+static json_t *refined_json(const struct mesher_report *r)
+{
+	return json_pack("{s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:f}",
+	                 "elements", (json_int_t)r->elements_before,
+	                 "marked", (json_int_t)r->marked,
+	                 "patches", (json_int_t)r->patches_before,
+	                 "patches_marked", (json_int_t)r->patches_marked,
+	                 "patches_for_lobes", (json_int_t)r->patches_for_lobes,
+	                 "error", r->error_before, "error_of_patches", r->patch_error_before,
+	                 "expected_error", r->error_expected);
+}
+
 static char *report_text(const struct job *j, struct err *e)
 {
 	const struct mesher_report *r = &j->mesher;
-
-	return dump(json_pack("{s:i, s:o, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:o, s:o, s:f, s:f,"
+	json_t *o = json_pack("{s:i, s:o, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:o, s:o, s:f, s:f,"
 	                      " s:o, s:I, s:o, s:o, s:o, s:o}",
 	                      "bands", j->m.bands, "materials", materials_json(r),
 	                      "surfaces", (json_int_t)j->m.surface.n,
@@ -225,10 +272,14 @@ static char *report_text(const struct job *j, struct err *e)
 	                      "merged", (json_int_t)r->merged,
 	                      "cleaned_surfaces", surfaces_json(j),
 	                      "imprint", imprint_json(r),
-	                      "pieces", pieces_json(r), "notes", notes_json(&j->gltf)), e);
+	                      "pieces", pieces_json(r), "notes", notes_json(&j->gltf));
+
+	if (j->r->solution)
+		json_object_set_new(o, "refined", refined_json(r));
+	return dump(o, e);
 }
 
-/* Equal keys, equal output: program, options, content of the scene's files. */
+/* Equal keys, equal output: program, options, content of the scene's files, the solution. */
 static char *make_key(const struct job *j)
 {
 	char hex[33];
@@ -237,6 +288,8 @@ static char *make_key(const struct job *j)
 	digest_string(d, "mesh " TWOPASS_VERSION " " CACHE_VERSION " " REVISION_MESH);
 	digest_string(d, j->info.options);
 	digest_string(d, j->gltf.digest);
+	if (j->r->solution)
+		digest_string(d, j->old_info.key ? j->old_info.key : "");
 	digest_end(d, hex);
 	return strdup(hex);
 }
@@ -276,6 +329,11 @@ static void print_counts(FILE *f, const struct job *j)
 	if (r->fine_contacts)
 		fprintf(f, "%s%zu contact%s of less than half an element left alone",
 		        r->cut ? "; " : "\nimprint     ", r->fine_contacts, plural(r->fine_contacts));
+	if (j->r->solution)
+		fprintf(f, "\nrefined     %zu of %zu elements, %zu of %zu patches, %zu of them for lobes\n"
+		        "error       %.3g relative (%.3g of it from patches), %.3g expected now",
+		        r->marked, r->elements_before, r->patches_marked, r->patches_before,
+		        r->patches_for_lobes, r->error_before, r->patch_error_before, r->error_expected);
 	fprintf(f, "\nelements    %zu", m->elements);
 	print_size(f, "edges", r->element_size);
 	fprintf(f, "patches     %zu, %zu of them plane", m->patches, r->planar_patches);
@@ -356,7 +414,9 @@ static int divide(struct job *j, struct err *e)
 	struct err inner = { 0 };
 
 	o.progress = &progress;
-	int status = mesher_run(&j->m, &o, &j->mesher, &inner);
+	int status = j->r->solution ? mesher_refine(&j->m, &o, &j->old, &j->s, &j->r->refine,
+	                                            &j->origin, &j->mesher, &inner)
+	                            : mesher_run(&j->m, &o, &j->mesher, &inner);
 	cli_progress_end(&bar);
 	return status ? err_set(e, "%s: %s", j->r->scene, inner.text) : 0;
 }
@@ -389,6 +449,8 @@ static int work(struct job *j, int argc, char **argv, struct err *e)
 		return -1;
 	for (size_t i = 0; i < j->gltf.notes; i++)
 		cli_note(j->cli, "%s: %s", j->r->scene, j->gltf.note[i]);
+	if (j->r->solution && rad_file_read(j->r->solution, &j->old, &j->s, &j->old_info, e))
+		return -1;
 	j->info.options = options_text(j->r, e);
 	if (!j->info.options || !(j->info.key = make_key(j)))
 		return err_set(e, "out of memory for options");
@@ -423,6 +485,10 @@ int main(int argc, char **argv)
 	mesher_report_free(&j.mesher);
 	gltf_report_free(&j.gltf);
 	cache_info_free(&j.info);
+	cache_info_free(&j.old_info);
+	solution_free(&j.s);
+	model_free(&j.old);
 	model_free(&j.m);
+	free(j.origin);
 	return cli_finish(&c, status);
 }

@@ -18,6 +18,7 @@
 #include "../lib/mem.h"
 #include "../lib/view.h"
 #include "common/cli.h"
+#include "common/pattern.h"
 
 enum { OPT_EYE = 256, OPT_TARGET, OPT_UP, OPT_FOV, OPT_SAMPLES, OPT_LOBE_SAMPLES, OPT_DEPTH,
        OPT_CUTOFF, OPT_HALF, OPT_COMPRESSION, OPT_LAYERS, OPT_MIX, OPT_GATHER_RAYS,
@@ -34,7 +35,7 @@ static const struct cli_option option_table[] = {
 	{ OPT_TARGET, "target", "X,Y,Z", "point it looks at" },
 	{ OPT_UP, "up", "X,Y,Z", "its upright direction (default: 0,1,0)" },
 	{ OPT_FOV, "fov", "DEGREES", "its vertical field of view (default: 50)" },
-	{ 'd', "diffuse", "METHOD", "where diffuse light comes from: mesh (default), direct, gather" },
+	{ 'd', "diffuse", "METHOD", "where diffuse light comes from: mesh, direct (default), gather" },
 	{ 't', "error", "X", "relative standard error of pixels at which sampling stops" },
 	{ OPT_BUDGET, "budget", "SECONDS", "as many samples and rays as fit in, for each picture" },
 	{ OPT_SAMPLES, "samples", "N", "positions in each pixel (default: 4; 1: its centre)" },
@@ -219,26 +220,6 @@ static int ad_hoc_camera(struct trace *t, struct err *e)
 	return t->ad_hoc.name ? (void)strcpy(t->ad_hoc.name, "view"), 0 : -1;
 }
 
-/* The output with each %s replaced by the name; slashes in it become underscores. */
-static char *output_path(const char *pattern, const char *name, struct err *e)
-{
-	size_t uses = 0, n = strlen(name);
-
-	for (const char *p = pattern; (p = strstr(p, "%s")); p += 2)
-		uses++;
-	char *path = mem_new(strlen(pattern) + uses * n + 1, 1, "path", e), *out = path;
-	while (path && *pattern) {
-		if (strncmp(pattern, "%s", 2) != 0) {
-			*out++ = *pattern++;
-			continue;
-		}
-		for (size_t i = 0; i < n; i++)
-			*out++ = name[i] == '/' ? '_' : name[i];
-		pattern += 2;
-	}
-	return path;
-}
-
 /* Everything that decides a picture's contents. */
 static void picture_key(const struct trace *t, struct shot *s)
 {
@@ -264,7 +245,7 @@ static int add_shot(struct trace *t, const struct camera *c, struct err *e)
 	struct shot *s = &t->shot[t->shots++];
 
 	s->camera = c;
-	s->path = output_path(t->output, c->name, e);
+	s->path = pattern_fill(t->output, c->name, e);
 	if (!s->path || camera_frame(c, t->width, t->height, &s->frame, e))
 		return -1;
 	for (const struct shot *p = t->shot; p < s; p++)
@@ -493,6 +474,7 @@ int main(int argc, char **argv)
 		.cli = { .program = "trace", .synopsis = "[options] FILE.rad -o PICTURE.exr",
 		         .about = "Render views of a solved scene, following mirrors and panes.",
 		         .options = option_table, .uses_threads = 1 },
+		.method = VIEW_DIRECT,
 		.view = { .depth = 32, .cutoff = 1e-3 }
 	};
 	struct err e = { 0 };

@@ -25,6 +25,7 @@ SCHEMES = {
     "centroid": ["--links", "centroid"],
     "one lobe": ["--lobe-depth", "0"],
     "default": [],
+    "fine": ["-n", "65536", "--lobe-rays", "65536"],
 }
 
 
@@ -171,12 +172,21 @@ class Result:
         self.seconds = seconds
 
 
-def compare(name, n, schemes, samples, size):
+def make_mesh(path, size, refine):
+    """The scene's mesh, refined so many times by solutions of the default."""
+    options = [path(".gltf"), "-o", path(".mesh"), "-p", size, "-e", size]
+    run("mesh", *options)
+    for _ in range(refine):
+        solve(path, SCHEMES["default"])
+        run("mesh", *options, "--refine", path(".rad"))
+
+
+def compare(name, n, schemes, samples, size, refine=0):
     """A Result for each scheme, by name."""
     with tempfile.TemporaryDirectory() as folder:
         path = lambda suffix: os.path.join(folder, "scene" + suffix)
         scene_of(name, *SCENES[name](n)).write(path(".gltf"))
-        run("mesh", path(".gltf"), "-o", path(".mesh"), "-p", size, "-e", size)
+        make_mesh(path, size, refine)
         h, error = truth(path(".mesh"), samples)
         for scheme in schemes:
             field, seconds = spent(lambda: solve(path, SCHEMES[scheme]))
@@ -186,16 +196,19 @@ def compare(name, n, schemes, samples, size):
 def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     p.add_argument("-n", default="20,1000", help="exponents")
-    p.add_argument("-s", "--schemes", default=",".join(SCHEMES))
+    p.add_argument("-s", "--schemes", default="paper,centroid,one lobe,default",
+                   help=", ".join(SCHEMES))
     p.add_argument("--size", type=float, default=.25, help="of patches and elements")
     p.add_argument("--samples", type=int, default=4000000, help="particles of the yardstick")
+    p.add_argument("--refine", type=int, default=0, help="how often the mesh is refined")
     p.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join(SCENES))
     a = p.parse_args()
     print("| scene | exponent | scheme | rms error | of flux | yardstick | stated | seconds |\n"
           "| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: |")
     for name in a.scenes or SCENES:
         for n in a.n.split(","):
-            for scheme, r in compare(name, float(n), a.schemes.split(","), a.samples, a.size):
+            for scheme, r in compare(name, float(n), a.schemes.split(","), a.samples, a.size,
+                                     a.refine):
                 print(f"| {name} | {n} | {scheme} | {100 * r.rms:.2f} % | {100 * r.flux:+.2f} % | "
                       f"{100 * r.noise:.2f} % | {100 * r.stated:.2f} % | {r.seconds:.2f} |", flush=True)
 

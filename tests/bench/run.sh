@@ -44,5 +44,5 @@ pair "shoot, clutter, GB/s" \
 	"rm -f clutter.rad; '$bin/shoot' -o clutter.rad clutter.mesh clutter.ff | field GB" \
 	"'$bin/bench/rays' cornell.mesh 1000 $threads | sed -n 's/^read_gb_per_s //p'"
 pair "trace, clutter, Mray/s" \
-	"rm -f a.exr; '$bin/trace' -c overview -s 1280x720 --samples 4 --depth 0 -o a.exr clutter.rad | field Mray" \
+	"rm -f a.exr; '$bin/trace' -d mesh -c overview -s 1280x720 --samples 4 --depth 0 -o a.exr clutter.rad | field Mray" \
 	"bare clutter.mesh 4000000 $threads --camera overview 1280x720"

@@ -38,9 +38,9 @@ while read -r scene camera size; do
 	prepare mesh "$scenes/$scene.gltf" -o "$T/a.mesh"
 	prepare ffcalc "$T/a.mesh" -o "$T/a.ff" -n 2048
 	prepare shoot "$T/a.mesh" "$T/a.ff" -o "$T/a.rad"
-	prepare trace "$T/a.rad" -c $camera -s $size --samples 16 --lobe-samples 4 \
+	prepare trace "$T/a.rad" -d mesh -c $camera -s $size --samples 16 --lobe-samples 4 \
 		--compression none -o "$T/view.exr"
-	prepare trace "$T/a.rad" -c $camera -s $size --samples 64 --layers emission \
+	prepare trace "$T/a.rad" -d mesh -c $camera -s $size --samples 64 --layers emission \
 		--compression none -o "$T/lamp.exr"
 	inspect --csv "$T/a.rad" >"$T/a.csv"
 	prepare twice "$T/h" --irradiance --samples 1000000

@@ -64,7 +64,9 @@ static inline double brute_lambert(const double x[3], const double normal[3],
 		double s = v3_normalise(c), cosine = v3_dot(a, b);
 		if (!(la > 0 && lb > 0 && s > 0))
 			continue;
-		double angle = fabs(cosine) < .9 ? acos(cosine) : cosine > 0 ? asin(s) : 3.14159265358979323846 - asin(s);
+		double angle = fabs(cosine) < .9 ? acos(cosine)
+		               : cosine > 0      ? asin(s)
+		                                 : 3.14159265358979323846 - asin(s);
 		sum -= angle * v3_dot(c, normal);
 	}
 	return sum / 6.28318530717958647693;

@@ -102,6 +102,7 @@ static inline void grid_solution(const struct model *m, double h, struct solutio
 	s->caustic = calloc(n, sizeof *s->caustic);
 	s->indirect = calloc(n, sizeof *s->indirect);
 	s->error = calloc(n, sizeof *s->error);
+	s->error_direct = calloc(n, sizeof *s->error_direct);
 	for (size_t i = 0; i < n; i++)
 		s->indirect[i] = h;
 }
@@ -112,6 +113,8 @@ static inline void grid_solution_free(struct solution *s)
 	free(s->caustic);
 	free(s->indirect);
 	free(s->error);
+	free(s->error_direct);
+	free(s->discretisation_direct);
 	free(s->discretisation);
 }
 

@@ -167,6 +167,8 @@ static inline void small_solution(struct solution *s, const struct model *m)
 		.patch_sides = patch_sides, .sources = patch_sides + m->light.n, .links = 1, .shots = 42,
 		.direct = ramp(sides * bands, .5), .caustic = ramp(sides * bands, .25),
 		.indirect = ramp(sides * bands, .125), .error = ramp(sides * bands, .01),
+		.error_direct = ramp(sides * bands, .01),
+		.discretisation_direct = ramp(sides * bands, .01),
 		.discretisation = ramp(sides * bands, .02),
 		.unshot_emission = ramp((patch_sides + m->light.n) * bands, 0),
 		.unshot_diffuse = ramp(patch_sides * bands, 1e-3),

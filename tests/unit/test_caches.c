@@ -183,6 +183,8 @@ static void test_rad(void **state)
 	assert_int_equal(s.links, 1);
 	SAME(s.direct, solution.direct, 18);
 	SAME(s.error, solution.error, 18);
+	SAME(s.error_direct, solution.error_direct, 18);
+	SAME(s.discretisation_direct, solution.discretisation_direct, 18);
 	SAME(s.discretisation, solution.discretisation, 18);
 	SAME(s.unshot_link, solution.unshot_link, 6);
 	SAME(s.ledger, solution.ledger, LEDGER_TERMS * 3);

@@ -67,7 +67,7 @@ static void put_floor(struct stage *t, size_t n)
 static double lit(struct stage *t, double x, double y, int side, double *error)
 {
 	struct err e = { 0 };
-	double at[3] = { x, y, 0 }, h, off;
+	double at[3] = { x, y, 0 }, nothing = 0, h, off;
 
 	for (uint32_t i = 0; i < t->m.elements; i++) {
 		const double *v[3];
@@ -81,7 +81,7 @@ static double lit(struct stage *t, double x, double y, int side, double *error)
 		if (v[0][2] != 0 || w[0] < -1e-12 || w[1] < -1e-12 || w[2] < -1e-12)
 			continue;
 		direct_begin(t->w, 2 * i + (uint32_t)side);
-		assert_int_equal(direct_at(t->w, at, 1, 1e-3, &h, &off, &e), 0);
+		assert_int_equal(direct_at(t->w, at, 1, 1e-3, &nothing, &h, &off, &e), 0);
 		*error = off;
 		return h;
 	}

@@ -122,6 +122,7 @@ static struct outcome run_noisy(field *f, double noise, double said)
 		s.error[2 * i] = said;
 	}
 	s.discretisation = calloc(2 * m.elements, sizeof *s.discretisation);
+	s.discretisation_direct = calloc(2 * m.elements, sizeof *s.discretisation_direct);
 	assert_int_equal(discretisation_estimate(&m, &s, 2, &e), 0);
 	assert_int_equal(reconstruct(&m, &s, PART_ALL, 1, &r, &e), 0);
 	for (size_t i = 0; i < m.elements; i++) {

@@ -175,14 +175,14 @@ static void floor_with(struct model *m, enum light_kind kind, const double direc
 static double direct(const struct model *m, double x, double y)
 {
 	struct err e = { 0 };
-	double at[3] = { x, y, 0 }, h = 0, error;
+	double at[3] = { x, y, 0 }, nothing = 0, h = 0, error;
 	struct ray_scene *rays = ray_scene_new(m, &e);
 	struct direct *d = direct_new(m, rays, &e);
 	struct direct_worker *w = direct_worker_new(d, &e);
 
 	assert_non_null(w);
 	direct_begin(w, 0);
-	assert_int_equal(direct_at(w, at, 1, 1e-3, &h, &error, &e), 0);
+	assert_int_equal(direct_at(w, at, 1, 1e-3, &nothing, &h, &error, &e), 0);
 	assert_true(error == 0);
 	direct_worker_free(w);
 	direct_free(d);

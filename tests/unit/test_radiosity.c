@@ -376,6 +376,50 @@ static void white_furnaces(void **state)
 	white_furnace(.9999, 100);
 }
 
+/* A box of two albedos stopped early: all that is still to arrive is below the bound, and
+ * not far below. */
+static void bound_is_sharp(void **state)
+{
+	struct model m;
+	struct ff f;
+	struct ff_stats stats;
+	struct transport t;
+	struct solution s;
+	struct err e = { 0 };
+	const uint32_t material[6] = { 0, 0, 0, 1, 1, 1 };
+	const struct ff *shard[] = { &f };
+	const char *name[] = { "memory" };
+	double arrived[2];
+	struct radiosity_report r;
+
+	(void)state;
+	grid_new(&m, 6, 4, 2, 1);
+	grid_box(&m, 4, material, zero, one);
+	set_diffuse(&m, 0, .9, 1);
+	set_diffuse(&m, 1, .3, 0);
+	grid_end(&m);
+	memory_ff(&m, &rays, &f, &stats);
+	assert_int_equal(transport_init(&t, &m, shard, name, 1, 2, &e), 0);
+	assert_int_equal(solution_begin(&s, &m, &t, 0, &e), 0);
+	for (int k = 0; k < 2; k++) {
+		struct radiosity_options o = { k ? 1e-12 : .1, UINT64_MAX, 2 };
+		struct radiosity_report end;
+		assert_int_equal(radiosity_shoot(&s, &t, &o, NULL, k ? &end : &r, &e), 0);
+		assert_int_equal(radiosity_gather(&s, &t, 2, &end, &e), 0);
+		arrived[k] = 0;
+		for (size_t i = 0; i < m.elements; i++)
+			arrived[k] += m.element_area[i] * solution_irradiance(&s, 2 * i, 0);
+	}
+	double missing = (arrived[1] - arrived[0]) / s.ledger[LEDGER_EMITTED];
+	assert_true(missing > .1);
+	assert_true(missing <= r.bound * (1 + 1e-9));
+	assert_true(r.bound <= 1.1 * missing);
+	solution_free(&s);
+	transport_free(&t);
+	ff_free(&f);
+	model_free(&m);
+}
+
 /* Shooting every side by turns until nothing is left, with plain shots alone. */
 static void shoot_all(struct solver *v)
 {
@@ -468,6 +512,7 @@ int main(void)
 		cmocka_unit_test(shards_of_two_kinds),
 		cmocka_unit_test(white_box_has_no_steady_state),
 		cmocka_unit_test(white_furnaces),
+		cmocka_unit_test(bound_is_sharp),
 		cmocka_unit_test(overshooting_as_shots),
 	};
 

@@ -47,7 +47,7 @@ PLAN = Plan(
     ladder=(1, 4, 16, 64, 256), crowd=(10_000, 100_000, 1_000_000), repeat=1, repeat_views=3,
     solutions=99, steps=99, ff_scenes=("cube16", "cube24", "room", "city100"), ff_rays=40960,
     oracles=("--all", "--method", "best"), hard=True, lobe_scenes=(), lobe_exponents=(20, 1000),
-    lobe_samples=1_000_000, lobe_size=.25, exponents=EXPONENTS,
+    lobe_samples=4_000_000, lobe_size=.25, exponents=EXPONENTS,
     most={("two-pass", "analytic"): 0, ("clutter", "analytic"): 0, ("clutter", "hemicube"): 0,
           ("clutter", "rays"): 2, ("clutter", "auto"): 2, ("clutter", None): 1,
           ("cornell", "analytic"): 2})

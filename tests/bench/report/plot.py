@@ -46,14 +46,14 @@ class Panel:
         return (f"set {name}range [{low:g}:{high if high > low else 2 * high:g}]\n"
                 f"set {name}tics ({', '.join(f'{s:g}' for s in labels)})")
 
-    def commands(self, first):
-        """The blocks of data are numbered from `first`."""
+    def commands(self, first, names):
+        """The blocks of data are numbered from `first`; a name has one colour everywhere."""
         data, drawn = [], []
         for i, c in enumerate(self.curves):
             points = "\n".join(f"{x:.6g} {y:.6g}" for x, y in c.points)
             data.append(f"$d{first + i} << EOD\n{points}\nEOD")
             style = f"dt {2 if c.dashed else 1} lw 2 pt {6 if c.dashed else 7} ps .6 " \
-                    f"lc rgb '{COLOURS[i % len(COLOURS)]}'"
+                    f"lc rgb '{COLOURS[names.index(c.name) % len(COLOURS)]}'"
             how = "linespoints" if c.joined else "points"
             drawn.append(f"$d{first + i} using 1:2 with {how} {style} title {quoted(c.name)}")
         axes = (f"set title {quoted(self.title)}\nset xlabel {quoted(self.x)}\n"
@@ -71,9 +71,10 @@ def draw(directory, name, about, panels, across=2, high=330, wide=1200):
     if not panels:
         raise Failed(f"nothing to draw in {name}")
     os.makedirs(directory, exist_ok=True)
+    names = list(dict.fromkeys(c.name for p in panels for c in p.curves))
     down, at, commands = -(-len(panels) // across), 0, []
     for p in panels:
-        commands.append(p.commands(at))
+        commands.append(p.commands(at, names))
         at += len(p.curves)
     for kind, terminal in KINDS.items():
         words = (f"set terminal {terminal.format(wide=wide, high=high * down)} noenhanced\n"

@@ -30,7 +30,7 @@ def section(run):
         rays, read = bare(scene.path("mesh"), threads)
         primary, _ = bare(scene.path("mesh"), threads, "--camera", scene.camera, scene.size())
         view = ran("trace", scene.path("rad"), "-c", scene.camera, "-s", "1280x960",
-                   "--samples", 4, "-o", fresh(scene.path("rate.exr")))
+                   "-d", "mesh", "--samples", 4, "-o", fresh(scene.path("rate.exr")))
         rows += [row(f"`ffcalc -m rays`, {name}: rays",
                      solved.stages[1].said(r"\(([\d.]+) Mray/s"), rays, "Mray/s"),
                  row(f"`trace -d mesh`, {name}: rays from the camera",

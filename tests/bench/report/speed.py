@@ -14,7 +14,7 @@ OTHERS = [Solution("all defaults"),
           Solution("`mesh -e 2%`", ["-e", "2%"]),
           Solution("`mesh -e 2%`, `ffcalc -n 16384`", ["-e", "2%"], ["-n", 16384])]
 # One position in a pixel, its centre, for the yardstick has that too.
-SMOOTH = ["--samples", 1, "--lobe-samples", 16]
+SMOOTH = ["-d", "mesh", "--samples", 1, "--lobe-samples", 16]
 HEAD = ["scene", "setting", "mesh", "ffcalc", "shoot", "first view", "further view", "MB",
         "picture", "of reference", "bias", "99 %", "irradiance", "of reference"]
 

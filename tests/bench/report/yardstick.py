@@ -186,8 +186,8 @@ class Scene:
         """The pixels that see neither a lamp nor nothing; from any solution."""
         if self.keep is None:
             out = fresh(self.path("seen.exr"))
-            run("trace", self.path("rad"), "-c", self.camera, "-s", self.size(), "--samples", 1,
-                "--layers", "emission,Z", "--compression", "none", "-o", out)
+            run("trace", self.path("rad"), "-c", self.camera, "-s", self.size(), "-d", "mesh",
+                "--samples", 1, "--layers", "emission,Z", "--compression", "none", "-o", out)
             planes = {name: self.lattice.pick(p) for name, p in picture(out).items()}
             lamp = sum(planes["emission." + c] for c in "RGB") > 0
             self.keep = ~lamp & np.isfinite(planes["Z"])
