@@ -95,8 +95,26 @@ static const struct facet *front_part(const struct facet *f, const struct facet 
 	return facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
 }
 
-double exchange(struct exchanger *x, const struct facet_set *sa, uint32_t i,
-                const struct facet_set *sb, uint32_t j, double *error, struct err *e)
+/* Can nothing be between, and is each wholly in front of the other? What most pairs of a
+ * convex scene are. */
+static int plainly_clear(const struct exchanger *x, const struct facet *a, const struct facet *b)
+{
+	return !x->bodies->nodes && v3_dot(b->normal, a->centre) - b->offset >= a->radius &&
+	       v3_dot(a->normal, b->centre) - a->offset >= b->radius;
+}
+
+static double clear_pair(struct exchanger *x, const struct facet *a, struct clear_points pa,
+                         const struct facet *b, struct clear_points pb, double *error)
+{
+	double clear = clear_exchange(&x->clear, a, pa, b, pb);
+
+	*error = x->o.relative * clear;
+	x->counts.clear++;
+	return clear;
+}
+
+static double any_pair(struct exchanger *x, const struct facet_set *sa, uint32_t i,
+                       const struct facet_set *sb, uint32_t j, double *error, struct err *e)
 {
 	struct clear_points pa = { sa->stored[i], &sa->joint[i] };
 	struct clear_points pb = { sb->stored[j], &sb->joint[j] };
@@ -127,12 +145,21 @@ double exchange(struct exchanger *x, const struct facet_set *sa, uint32_t i,
 		x->counts.crowded++;
 		return 0;
 	}
+	if (sight == SIGHT_CLEAR)
+		return clear_pair(x, a, pa, b, pb, error);
 	double clear = clear_exchange(&x->clear, a, pa, b, pb);
-	*error = x->o.relative * clear;
-	if (sight == SIGHT_CLEAR) {
-		x->counts.clear++;
-		return clear;
-	}
 	x->counts.crowded++;
 	return crowded(x, a, b, clear, ((uint64_t)i << 32) ^ j, error);
+}
+
+double exchange(struct exchanger *x, const struct facet_set *sa, uint32_t i,
+                const struct facet_set *sb, uint32_t j, double *error, struct err *e)
+{
+	const struct facet *a = &sa->facet[i], *b = &sb->facet[j];
+
+	if (!plainly_clear(x, a, b))
+		return any_pair(x, sa, i, sb, j, error, e);
+	x->counts.pairs++;
+	return clear_pair(x, a, (struct clear_points){ sa->stored[i], &sa->joint[i] },
+	                  b, (struct clear_points){ sb->stored[j], &sb->joint[j] }, error);
 }
