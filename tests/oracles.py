@@ -19,8 +19,9 @@ fitted point value the elements' errors are combined as if they were independent
 a particle meets many elements, so means of particles are judged by the spread of
 independent runs.
 A point value is the mean of a tiny element there, if the scene was cut so, else the
-local quadratic whose element means fit the computed ones best. E/pi is rounded in the scene, hence the floor of 4e-15 under every relative
-tolerance; an expected 0 must be exactly 0."""
+local quadratic whose element means fit the computed ones best. E/pi is
+rounded in the scene, hence the floor of 4e-15 under every relative tolerance; an
+expected 0 must be exactly 0."""
 import argparse
 import fnmatch
 import json
