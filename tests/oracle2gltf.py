@@ -7,6 +7,8 @@ Each face becomes a node of its own name; rectangles keep their float64 corners 
 unit square under a matrix), other polygons are rounded to float32. An exitance E
 becomes the radiance E/pi. A material whose back has no coefficient and no emission,
 and whose front does not transmit, is one-sided."""
+import copy
+import fnmatch
 import json
 import math
 import os
@@ -28,8 +30,12 @@ def oracles():
         data = json.load(f)
     known = {o["id"]: o for o in data["oracles"]}
     known["khodulev_cube"] = khodulev(known["khodulev_cube"])
-    point = next(a for a in data["analytic"] if a["id"] == "cie171_5.2_diffuse_point")
+    analytic = {a["id"]: a for a in data["analytic"]}
+    point = analytic["cie171_5.2_diffuse_point"]
     known[point["id"]] = small_lamp(point)
+    for o in [*becoming_mirror(analytic["phong_to_mirror_series"], known["phong_to_mirror_n10"]),
+              *swapped(analytic["reciprocity_swap"])]:
+        known.setdefault(o["id"], o)
     with open(os.path.join(DATA, "cornell_box.json"), encoding="utf-8") as f:
         box = json.load(f)
     for wavelength in box["reference_mean_irradiance_per_unit_light_exitance"]:
@@ -93,6 +99,58 @@ def khodulev(oracle):
         expect.append(e)
     return {**oracle, "materials": {"wall": {"front": {"rho_d": rho}, "back": {}}}, "faces": faces,
             "lights": [{"name": "lamp", "kind": "point", "intensity": 50000}], "expect": expect}
+
+
+def graded(oracle, cuts):
+    """The same scene with its rectangles cut along both edges at fractions, for light that
+    changes fast in places. cuts: {pattern of names: fractions}, the first that fits counts."""
+    faces = []
+    for face in oracle["faces"]:
+        a, b, _, d = np.array(face["verts"], float)
+        at = lambda u, v: (a + u * (b - a) + v * (d - a)).tolist()
+        fractions = next(cuts[p] for p in cuts if fnmatch.fnmatchcase(face["name"], p))
+        spans = list(zip(fractions, fractions[1:]))
+        faces += [{**face, "name": f"{face['name']} {u},{v}",
+                   "verts": [at(u, v), at(x, v), at(x, y), at(u, y)]}
+                  for u, x in spans for v, y in spans]
+    expect = [{**e, "face": e["face"] + "*"} for e in oracle["expect"]]
+    return {**oracle, "faces": faces, "expect": expect}
+
+
+def sampled(value, error, **expect):
+    """A mean irradiance that particles found: four of their standard errors are allowed."""
+    return {"quantity": "H", "side": "front", "stat": "mean", "value": value,
+            "rel_tol_hemicube": .02, "rel_tol": max(.002, 4 * error / value), **expect}
+
+
+def becoming_mirror(series, scene):
+    """The scene of a lobe's exponent and of both kinds of lobes."""
+    for kind, name, values in (("seed", "phong", series["values"]["seed"]),
+                               ("reciprocal", "reciprocal", series["values"]["max"])):
+        for n, v in values.items():
+            materials = copy.deepcopy(scene["materials"])
+            for m in materials.values():
+                if m["front"].get("rho_s"):
+                    m["front"]["n"] = float(n)
+            yield {**scene, "id": f"{name}_to_mirror_n{n}", "lobe": kind, "materials": materials,
+                   "expect": [sampled(v["H"], v["se"], face="receiver")]}
+
+
+def swapped(oracle):
+    """Light of A and of B by way of a lobe of exponent 1, of both kinds, to the other."""
+    faces = [("lobe", [(-.5, -.5, 0), (.5, -.5, 0), (.5, .5, 0), (-.5, .5, 0)]),
+             ("A", [(-.5, .5, 2), (.5, .5, 2), (.5, -.5, 2), (-.5, -.5, 2)]),
+             ("B", [(2, -.5, .1), (2, -.5, .6), (2, .5, .6), (2, .5, .1)])]
+    area = {"A": 1, "B": .5}
+    for kind, values in oracle["values"].items():
+        for emitter, receiver in ("AB", "BA"):
+            materials = {"lobe": {"front": {"rho_s": 1, "n": 1}, "back": {}},
+                         receiver: {"front": {}, "back": {}}, emitter: {"front": {"E": 1}, "back": {}}}
+            flux, error = (x / area[receiver] for x in values[f"flux_{emitter}_to_{receiver}"])
+            yield {"id": f"swap_{kind}_{emitter}_to_{receiver}", "group": "specular",
+                   "materials": materials, "lobe": "seed" if kind.startswith("seed") else "reciprocal",
+                   "faces": [{"name": n, "mat": n, "verts": v} for n, v in faces],
+                   "expect": [sampled(flux, error, face=receiver)]}
 
 
 def small_lamp(oracle):
