@@ -157,20 +157,25 @@ static void differences(void *arg, size_t begin, size_t end, int thread)
 
 /* ---- noise ---- */
 
-/* A quantile of difference squared over its stated variance, to 5 %, by a histogram of
- * logarithms; INFINITY where there is no noise. */
-static double quantile_of_ratios(const struct job *j, size_t part, double q)
+/* A quantile of difference squared over its stated variance in the sum of the parts begin
+ * to end, to 5 %, by a histogram of logarithms; INFINITY where there is no noise. */
+static double quantile_of_ratios(const struct job *j, size_t begin, size_t end, double q)
 {
 	enum { BINS = 2048, A_FACTOR_2 = 16 };
-	size_t bands = (size_t)j->s->bands, n = j->s->element_sides * PARTS * bands;
+	size_t bands = (size_t)j->s->bands, n = j->s->element_sides * bands;
 	size_t count[BINS] = { 0 }, all = 0, below = 0;
 	int bin = 0;
 
 	for (size_t i = 0; i < n; i++) {
-		double d = j->difference[i];
-		if (i / bands % PARTS != part || isnan(d) || !(j->noise[i] > 0))
+		double d = 0, noise = 0;
+		for (size_t part = begin; part < end; part++) {
+			size_t at = (i / bands * PARTS + part) * bands + i % bands;
+			d += j->difference[at];
+			noise += j->noise[at];
+		}
+		if (isnan(d) || !(noise > 0))
 			continue;
-		double at = BINS / 2 + A_FACTOR_2 * log2(fmax(d * d / j->noise[i], 1e-18));
+		double at = BINS / 2 + A_FACTOR_2 * log2(fmax(d * d / noise, 1e-18));
 		count[(size_t)fmax(0, fmin(BINS - 1, at))]++;
 		all++;
 	}
@@ -180,22 +185,23 @@ static double quantile_of_ratios(const struct job *j, size_t part, double q)
 }
 
 /* Stated errors take samples for independent. Where most elements differ less from their
- * neighbours than that says, errors are scaled to what they do. */
+ * neighbours than that says, errors are scaled to what they do: those of the parts, and
+ * those of all light apart, since what a form factor is off by is in both parts. */
 static void correct_noise(struct job *j)
 {
 	/* Steps are in the other elements. Of chi-square with one degree of freedom: */
 	static const double most = .7, chi_square = 1.0742;
 	size_t bands = (size_t)j->s->bands, n = j->s->element_sides * bands;
-	double scale[PARTS];
+	double scale[PARTS], whole = fmin(1, quantile_of_ratios(j, 0, PARTS, most) / chi_square);
 
 	for (size_t part = 0; part < PARTS; part++)
-		scale[part] = fmin(1, quantile_of_ratios(j, part, most) / chi_square);
+		scale[part] = fmin(1, quantile_of_ratios(j, part, part + 1, most) / chi_square);
 	for (size_t i = 0; i < n * PARTS; i++)
 		j->noise[i] *= scale[i / bands % PARTS];
 	for (size_t i = 0; i < n; i++) {
 		const double *v = &j->variance[i / bands * PARTS * bands + i % bands];
 		j->s->error_direct[i] = sqrt(scale[0] * v[0]);
-		j->s->error[i] = sqrt(scale[0] * v[0] + scale[1] * v[bands]);
+		j->s->error[i] = sqrt(fmax(scale[0] * v[0], whole * (v[0] + v[bands])));
 	}
 }
 
@@ -284,7 +290,8 @@ int discretisation_estimate(const struct model *m, struct solution *s, int threa
 	j.difference = mem_new(n, sizeof *j.difference, "irradiance", e);
 	j.noise = mem_new(n, sizeof *j.noise, "irradiance", e);
 	j.variance = mem_new(n, sizeof *j.variance, "irradiance", e);
-	if (j.h && j.variance && j.difference && j.noise && !smooth_groups_new(m, cos_crease, &j.g, e)) {
+	if (j.h && j.variance && j.difference && j.noise &&
+	    !smooth_groups_new(m, cos_crease, &j.g, e)) {
 		take_parts(&j);
 		par_for(m->elements, CHUNK, threads, differences, &j, NULL);
 		correct_noise(&j);
