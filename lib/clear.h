@@ -1,6 +1,7 @@
 /* Exchange areas of facets with nothing between them: by cubature where both are small for
- * their distance (one rule for two parallelograms that are very small), by Lambert's formula over the points of a small one near a large one, by
- * contour integrals for near and touching ones. */
+ * their distance (one rule for two parallelograms that are very small), by Lambert's formula
+ * over the points of a small one near a large one, by contour integrals for near and touching
+ * ones. */
 #ifndef TWOPASS_CLEAR_H
 #define TWOPASS_CLEAR_H
 

@@ -94,7 +94,8 @@ static four angle(four y, four x)
 	four t2 = t * t, t4 = t2 * t2, third[3];
 	for (int i = 0; i < 3; i++)
 		third[i] = arc[4 * i] + arc[4 * i + 1] * t + t2 * (arc[4 * i + 2] + arc[4 * i + 3] * t);
-	four sum = (third[0] + t4 * (third[1] + t4 * third[2])) * q + four_choose(turned, four_all(PI / 4), four_all(0));
+	four sum = (third[0] + t4 * (third[1] + t4 * third[2])) * q +
+	           four_choose(turned, four_all(PI / 4), four_all(0));
 	sum = four_choose(steep, PI / 2 - sum, sum);
 	return four_choose(x < 0, PI - sum, sum);
 }

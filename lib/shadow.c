@@ -153,7 +153,8 @@ static void find_idle(struct cuts *c, const struct blocker *b, int number)
 	for (int j = 0; j < c->f->n; j++) {
 		struct faces of_x = faces_from(b, &c->f->v[3 * j], c->near);
 		for (int i = 0; i < b->edges && !(c->s->idle >> number & 1); i++)
-			if (!within(b, i, of_x) && plane_through(b->edge[i].a, b->edge[i].along, &c->f->v[3 * j], c->near, &p) &&
+			if (!within(b, i, of_x) &&
+			    plane_through(b->edge[i].a, b->edge[i].along, &c->f->v[3 * j], c->near, &p) &&
 			    side_of(&p, c->f->v, c->f->n, c->near))
 				consider(c, b, number, &p, 0);
 	}
