@@ -295,24 +295,6 @@ static double guess(const struct direct_worker *w, const struct emitter *t, cons
 	return t->power * lobe(fmin(1, there / r), t->exponent) * (highest / r) / r2;
 }
 
-/* A point of a convex facet. */
-static void point_on(const struct facet *f, double u, double v, double x[3])
-{
-	double sum = 0, area[FACET_CORNERS] = { 0 };
-	int i;
-
-	for (int k = 1; k + 1 < f->n; k++) {
-		double n[3];
-		v3_area(f->v, &f->v[3 * k], &f->v[3 * (k + 1)], n);
-		sum += area[k] = v3_length(n);
-	}
-	for (i = 1, u *= sum; i + 2 < f->n && u >= area[i]; i++)
-		u -= area[i];
-	double r = sqrt(fmin(1, u / area[i]));
-	for (int k = 0; k < 3; k++)
-		x[k] = (1 - r) * f->v[k] + r * ((1 - v) * f->v[3 * i + k] + v * f->v[3 * i + 3 + k]);
-}
-
 /* 1 if nothing is between points x and y of the side and of an emitter. */
 static int clear_line(struct direct_worker *w, const double x[3], const double y[3],
                       const struct emitter *t)
@@ -342,7 +324,7 @@ static void add_ray(struct direct_worker *w, const double x[3], size_t n, const 
 	}
 	const struct emitter *t = d->exact ? w->outlook[lo].emitter : &d->emitters.emitter[lo];
 	double share = (w->weight[lo] - (lo ? w->weight[lo - 1] : 0)) / total;
-	point_on(&t->f, u[1], u[2], y);
+	facet_point(&t->f, u[1], u[2], y);
 	v3_sub(y, x, v);
 	double r2 = v3_dot(v, v), r = sqrt(r2);
 	double here = v3_dot(v, w->normal) / r, there = -v3_dot(v, t->f.normal) / r;

@@ -23,23 +23,6 @@ void exchanger_free(struct exchanger *x)
 
 /* ---- too many bodies between: rays between points of both ---- */
 
-static void point_on(const struct facet *f, double u, double v, double x[3])
-{
-	double sum = 0, area[FACET_CORNERS] = { 0 };
-	int i = 0;
-
-	for (int k = 1; k + 1 < f->n; k++) {
-		double n[3];
-		v3_area(f->v, &f->v[3 * k], &f->v[3 * (k + 1)], n);
-		sum += area[k] = v3_length(n);
-	}
-	for (i = 1, u *= sum; i + 2 < f->n && u >= area[i]; i++)
-		u -= area[i];
-	double r = sqrt(fmin(1, u / area[i]));
-	for (int k = 0; k < 3; k++)
-		x[k] = (1 - r) * f->v[k] + r * ((1 - v) * f->v[3 * i + k] + v * f->v[3 * i + 3 + k]);
-}
-
 static double crowded(struct exchanger *x, const struct facet *a, const struct facet *b,
                       double clear, uint64_t seed, double *error)
 {
@@ -52,8 +35,8 @@ static double crowded(struct exchanger *x, const struct facet *a, const struct f
 			double u[4], y[3], z[3], d[3];
 			for (int k = 0; k < 4; k++)
 				u[k] = rng_sobol(i, k, seed + p);
-			point_on(a, u[0], u[1], y);
-			point_on(b, u[2], u[3], z);
+			facet_point(a, u[0], u[1], y);
+			facet_point(b, u[2], u[3], z);
 			v3_sub(z, y, d);
 			double r2 = v3_dot(d, d);
 			double w = fmax(0, v3_dot(d, a->normal)) * fmax(0, -v3_dot(d, b->normal)) / (r2 * r2);

@@ -135,3 +135,20 @@ int facet_quarter(const struct facet *f, struct facet_room quarter[4])
 	       facet_split(&half[0].f, across, middle, quarter) &&
 	       facet_split(&half[1].f, across, middle, quarter + 2);
 }
+
+void facet_point(const struct facet *f, double u, double v, double x[3])
+{
+	double sum = 0, area[FACET_CORNERS] = { 0 };
+	int i;
+
+	for (int k = 1; k + 1 < f->n; k++) {
+		double n[3];
+		v3_area(f->v, &f->v[3 * k], &f->v[3 * (k + 1)], n);
+		sum += area[k] = v3_length(n);
+	}
+	for (i = 1, u *= sum; i + 2 < f->n && u >= area[i]; i++)
+		u -= area[i];
+	double r = sqrt(fmin(1, u / area[i]));
+	for (int k = 0; k < 3; k++)
+		x[k] = (1 - r) * f->v[k] + r * ((1 - v) * f->v[3 * i + k] + v * f->v[3 * i + 3 + k]);
+}

@@ -49,4 +49,7 @@ int facet_quarter(const struct facet *f, struct facet_room quarter[4]);
  * signs: at height 0. The same bits whichever way round the edge is given. */
 void edge_divide(const double a[3], double ha, const double b[3], double hb, double out[3]);
 
+/* A point of a convex facet, uniform by area, from two numbers in [0,1). */
+void facet_point(const struct facet *f, double u, double v, double x[3]);
+
 #endif
