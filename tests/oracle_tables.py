@@ -76,8 +76,8 @@ def lobes_in_box(oracle):
              "ymin": [(-1, -1, 0), (-1, -1, 1), (1, -1, 1), (1, -1, 0)],
              "ymax": [(1, 1, 0), (1, 1, 1), (-1, 1, 1), (-1, 1, 0)]}
     faces = [{"name": name, "mat": "k", "verts": v} for name, v in walls.items()]
-    faces.append({"name": "mirror", "mat": "m",
-                  "verts": [(-speck, -speck, 0), (speck, -speck, 0), (speck, speck, 0), (-speck, speck, 0)]})
+    square = lambda r, z: [(-r, -r, z), (r, -r, z), (r, r, z), (-r, r, z)]
+    faces.append({"name": "mirror", "mat": "m", "verts": square(speck, 0)})
     for name, shares in oracle["values"].items():
         theta, n = (int(word) for word in name[len("theta"):].split("_n"))
         s, c = math.sin(math.radians(theta)), math.cos(math.radians(theta))
@@ -102,8 +102,8 @@ def caustic(oracle):
     rho, rings, speck, flux = .3, 64, 5e-4, 1.0
     angle = np.pi * np.arange(rings + 1) / rings
     around = 2 * np.pi * np.arange(2 * rings + 1) / (2 * rings)
-    at = lambda i, j: (math.sin(angle[i]) * math.cos(around[j]), math.sin(angle[i]) * math.sin(around[j]),
-                       math.cos(angle[i]))
+    at = lambda i, j: (math.sin(angle[i]) * math.cos(around[j]),
+                       math.sin(angle[i]) * math.sin(around[j]), math.cos(angle[i]))
     quarter = lambda i: f"quarter {4 * i // rings}"
     faces, area = [], {}
     for i in range(rings):
@@ -117,8 +117,8 @@ def caustic(oracle):
             area[quarter(i)] = area.get(quarter(i), 0) + size
             faces.append({"name": f"{quarter(i)} {i},{j}", "mat": "mirror", "verts": corners})
     z = 1 - 3e-5
-    faces.append({"name": "speck", "mat": "speck",
-                  "verts": [(-speck, speck, z), (speck, speck, z), (speck, -speck, z), (-speck, -speck, z)]})
+    square = [(-speck, speck, z), (speck, speck, z), (speck, -speck, z), (-speck, -speck, z)]
+    faces.append({"name": "speck", "mat": "speck", "verts": square})
     materials = {"mirror": {"front": {"rho_s": rho, "n": "inf"}, "back": {}},
                  "speck": {"front": {"E": flux / (2 * speck) ** 2}, "back": {}}}
     expect = [{"quantity": "H", "stat": "mean", "face": name + " *", "side": "front",

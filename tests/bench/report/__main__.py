@@ -4,9 +4,10 @@
 report [--out DIR] [--full] [--quick] [--only SECTION]...
 
 Everything is measured anew, in less than 20 minutes on two idle processors; the last
-table says where they went. --full adds what takes longer, --quick takes so few samples that errors mean nothing (to try the
-programs). With --work DIR yardsticks are kept there for the next run; remove DIR when
-scenes or `reference` changed. BUILD says where the programs are (default build)."""
+table says where they went. --full adds what takes longer, --quick takes so few samples
+that errors mean nothing (to try the programs). With --work DIR yardsticks are kept there
+for the next run; remove DIR when scenes or `reference` changed. BUILD says where the
+programs are (default build)."""
 import argparse
 import concurrent.futures
 import os
@@ -41,9 +42,11 @@ SECTIONS = {  # what is submitted first of all, and what is timed and written th
     "speed": (speed.submit, speed.section), "stated": (None, stated.section),
     "exact": (exact.submit_oracles, exact.oracles),
     "hard-cases": (exact.submit_hard_cases, exact.hard_cases),
-    "form-factors": (None, exact.form_factors), "lobes": (directional.submit_schemes, directional.schemes),
+    "form-factors": (None, exact.form_factors),
+    "lobes": (directional.submit_schemes, directional.schemes),
     "exponents": (directional.submit_exponents, directional.exponent),
     "growth": (None, growth.section)}
+APART = {"speed-long": (speed.submit_long, speed.long_section)}  # only if asked for
 MINUTES = 20
 
 
@@ -148,15 +151,16 @@ def foot(run):
 def write(run, names):
     """The page, anew after each section; one that fails says so. Names of those."""
     begun, blocks, failed = load(), [], []
+    sections = {**SECTIONS, **APART}
     for name in names:
-        submit, _ = SECTIONS[name]
+        submit, _ = sections[name]
         if submit:
             submit(run)
     run.finish_jobs()
     for i, name in enumerate(names):
         spent = Spent()
         try:
-            blocks += SECTIONS[name][1](run)
+            blocks += sections[name][1](run)
         except Failed as e:
             print(f"report: {name}: {e}", file=sys.stderr)
             failed.append(name)
@@ -175,7 +179,7 @@ def arguments():
     p.add_argument("--work", help="keep all files here (default: a temporary directory)")
     p.add_argument("--full", action="store_true", help="also what takes hours")
     p.add_argument("--quick", action="store_true", help="tiny samples")
-    p.add_argument("--only", action="append", choices=list(SECTIONS),
+    p.add_argument("--only", action="append", choices=[*SECTIONS, *APART],
                    help="this section, may be repeated")
     p.add_argument("--readme", metavar="FILE", help="put the tables of these sections in this file")
     return p.parse_args()

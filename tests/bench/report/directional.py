@@ -17,7 +17,8 @@ def compared(*arguments):
 
 def submit_schemes(run):
     plan = run.plan
-    run.submit("lobes", {(scene, n): (compared, scene, n, plan.lobe_schemes, plan.lobe_samples, plan.lobe_size)
+    how = plan.lobe_schemes, plan.lobe_samples, plan.lobe_size
+    run.submit("lobes", {(scene, n): (compared, scene, n, *how)
                          for scene in plan.lobe_scenes or lobes.SCENES for n in plan.lobe_exponents})
 
 

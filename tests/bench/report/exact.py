@@ -53,8 +53,9 @@ def oracle_bars(rows, took):
               f"{bad} of {len(rows)} lines fail; slowest {slowest[0]}, {took[slowest]:.0f} s",
               not bad and took[slowest] <= SECONDS)
     parts = [[float(row[i]) for row in rows if row[i]] for i in (7, 8)]
-    for what, limit, found in (("exact answers: deviations in parts of their tolerances", MARGIN, parts[0]),
-                               ("exact answers: two standard errors likewise", NOISE, parts[1])):
+    for what, limit, found in (
+            ("exact answers: deviations in parts of their tolerances", MARGIN, parts[0]),
+            ("exact answers: two standard errors likewise", NOISE, parts[1])):
         within = sum(x <= limit for x in found)
         yield Bar(what, f"≤ {limit:g}", f"{within} of {len(found)}, at most {max(found):.2f}",
                   within == len(found))
@@ -71,8 +72,8 @@ def oracles(run):
     yield Words("""`tests/oracles.py` on the scenes and tables of
         `tests/data/global_illumination.json` and the Cornell box by wavelength, by settings
         chosen for their tolerances (`best`, its table `BEST`; other methods by its table
-        `CLASSES`). *Of it* is the deviation in parts of the tolerance, as are two standard errors as the programs
-        state them.""")
+        `CLASSES`). *Of it* is the deviation in parts of the tolerance, and so are two standard
+        errors: from the spread of independent runs, whose mean `best` is where it samples.""")
     marks = {i: "missed" for i, row in enumerate(rows) if row[-1] == answers.FAILED}
     yield Table("Values", list(answers.HEAD), rows, left=3).marked(marks)
     yield Table("Settings: sizes of patches and elements as parts of the longest edge",

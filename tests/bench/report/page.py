@@ -150,6 +150,7 @@ def replace_tables(path, tables):
         text = f.read()
     for name, table in tables.items():
         body = table.compact() + "\n"
-        text = re.sub(rf"(<!-- {name} -->\n).*?(?=<!-- end -->)", lambda m: m[1] + body, text, flags=re.DOTALL)
+        place = re.compile(rf"(<!-- {name} -->\n).*?(?=<!-- end -->)", re.DOTALL)
+        text = place.sub(lambda found: found[1] + body, text)
     with open(path, "w", encoding="utf-8") as f:
         f.write(text)

@@ -53,15 +53,15 @@ PLAN = Plan(
     exponents=EXPONENTS,
     most={("two-pass", "analytic"): 0, ("two-pass", None): 0, ("clutter", "analytic"): 0,
           ("clutter", "hemicube"): 0, ("clutter", "rays"): 2, ("clutter", "auto"): 3,
-          ("clutter", None): 0, ("cornell", "analytic"): 2})
+          ("clutter", None): 0})
 FULL = Plan(
     about="The long report (`make report FULL=1`): also the methods that take long, medians of three.",
     scenes=PLAN.scenes, samples={name: (4 * s, 4 * p) for name, (s, p) in PLAN.samples.items()},
     ladder=(1, 4, 16, 64, 256, 1024), crowd=(10_000, 100_000, 1_000_000, 10_000_000), repeat=3,
     repeat_views=5, solutions=99, steps=99,
     ff_scenes=("cube16", "cube24", "room", "room-turned", "city100", "city370", "city2100"),
-    ff_rays=409600, oracles=(), oracle_methods=("hemicube", "rays", "best"), hard=True, lobe_scenes=(),
-    lobe_exponents=(5, 20, 100, 1000), lobe_schemes=("paper", "centroid", "one lobe", "default", "fine"),
+    ff_rays=409600, oracles=(), oracle_methods=("hemicube", "rays", "best"), hard=True,
+    lobe_scenes=(), lobe_exponents=(5, 20, 100, 1000), lobe_schemes=("paper", "centroid", "one lobe", "default", "fine"),
     lobe_samples=16_000_000, lobe_size=.25, exponents=EXPONENTS)
 QUICK = Plan(
     about="A quick try of the programs: samples are so few that the errors mean nothing.",

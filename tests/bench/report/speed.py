@@ -12,6 +12,7 @@ METHODS = {  # options of ffcalc, from fast to fine
 DEFAULTS = ("auto", "-n 4096 -t 1e-4")
 OTHERS = [Solution("`mesh -e 2%`", ["-e", "2%"]),
           Solution("`mesh -e 2%`, `ffcalc -n 16384`", ["-e", "2%"], ["-n", 16384])]
+LONG = ("two-pass", "analytic")
 # One position in a pixel, its centre, for the yardstick has that too.
 SMOOTH = ["-d", "mesh", "--samples", 1, "--lobe-samples", 16]
 HEAD = ["scene", "setting", "mesh", "ffcalc", "shoot", "first view", "further view", "MB",
@@ -53,7 +54,9 @@ def solutions(scene, plan):
     for method in plan.methods(scene.name):
         for options in METHODS[method][:plan.settings(scene.name, method)]:
             words = ["-m", method, *options.split()]
-            name = f"`-m {method} {options}`" + (", the defaults" if (method, options) == DEFAULTS else "")
+            name = f"`-m {method} {options}`"
+            if (method, options) == DEFAULTS:
+                name += ", the defaults"
             yield Solution(name, ffcalc=words, method=method)
     yield from OTHERS[:plan.settings(scene.name, None)]
 
@@ -110,9 +113,33 @@ def section(run):
         for s in run.scenes.values()) + ". " + run.plan.left_out())
     yield draw(run.out, "speed", "error against processor seconds of four methods of form factors "
                "in three scenes, picture and irradiance, beside path tracing", drawn)
-    pick = lambda row: [row[c] for c in README]
-    run.readme["speed"] = Table("", pick(HEAD), [pick(row) for row in rows], left=2)
+    run.readme["speed"] = short(rows)
     yield Table("", HEAD, rows, left=2)
+
+
+def short(rows):
+    """The README's table."""
+    pick = lambda row: [row[c] for c in README]
+    return Table("", pick(HEAD), [pick(row) for row in rows], left=2)
+
+
+def submit_long(run):
+    run.scene(LONG[0])
+
+
+def long_section(run):
+    """The settings of a scene and a method that take minutes each."""
+    name, method = LONG
+    scene, rows = run.scene(name), []
+    for options in run.told(f"{method} on {name}", METHODS[method]):
+        words = ["-m", method, *options.split()]
+        solution = Solution(f"`{' '.join(words)}`", ffcalc=words, method=method)
+        rows.append(Row(scene, solution, run.plan.repeat))
+    ladders = (scene.picture_ladder(run.plan.ladder), scene.irradiance_ladder(run.plan.crowd))
+    cells = [row.cells(ladders) for row in rows]
+    run.readme["speed-long"] = short(cells)
+    yield Title(f"Speed against error: {method} on {name}")
+    yield Table("", HEAD, cells, left=2)
 
 
 def listed(numbers):
