@@ -1,5 +1,6 @@
 """Speed against error of all stages: each method of ffcalc at four settings, and other
 settings of mesh, through the chain on cornell, two-pass and clutter."""
+from chain import Failed
 from page import Table, Title, Words
 from plot import Curve, Panel, draw
 from setting import Solution, Solved, View
@@ -87,11 +88,15 @@ def submit(run):
 
 def section(run):
     """Fills run.rows and the scenes' yardsticks."""
-    rows, drawn = [], []
+    rows, drawn, failed = [], [], []
     for name in run.plan.scenes:
         scene = run.scene(name)
-        mine = [Row(scene, solution, run.plan.repeat)
-                for solution in run.told(f"speed against error, {name}", solutions(scene, run.plan))]
+        mine = []
+        for solution in run.told(f"speed against error, {name}", solutions(scene, run.plan)):
+            try:
+                mine.append(Row(scene, solution, run.plan.repeat))
+            except Failed as e:
+                failed.append(f"{name}, {solution.name}: {e}")
         ladders = (scene.picture_ladder(run.plan.ladder), scene.irradiance_ladder(run.plan.crowd))
         run.rows += mine
         rows += [r.cells(ladders) for r in mine]
@@ -115,6 +120,8 @@ def section(run):
                "in three scenes, picture and irradiance, beside path tracing", drawn)
     run.readme["speed"] = short(rows)
     yield Table("", HEAD, rows, left=2)
+    if failed:
+        yield Words("Could not be had: " + "; ".join(failed) + ".")
 
 
 def short(rows):
