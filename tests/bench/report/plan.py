@@ -44,7 +44,7 @@ PLAN = Plan(
     about="All in one run of less than 20 minutes on two processors; `make report FULL=1` "
           "measures more.",
     scenes=("cornell", "two-pass", "clutter"),
-    samples={"cornell": (24576, 32_000_000), "two-pass": (2048, 16_000_000),
+    samples={"cornell": (24576, 16_000_000), "two-pass": (2048, 16_000_000),
              "clutter": (1024, 16_000_000)},
     ladder=(1, 4, 16, 64, 256), crowd=(10_000, 100_000, 1_000_000), repeat=1, repeat_views=3,
     solutions=99, steps=99, ff_scenes=("cube16", "cube24", "room", "city100"), ff_rays=40960,
