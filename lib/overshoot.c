@@ -325,7 +325,7 @@ static void shoot_emission(struct solver *v)
 	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++)
 		for (size_t b = 0; b < bands; b++)
 			if (v->s->unshot_emission[ps * bands + b] > 0) {
-				solver_shoot(v, ps);
+				solver_shoot(v, ps, 0);
 				break;
 			}
 }

@@ -65,45 +65,6 @@ int solution_begin(struct solution *s, const struct model *m, const struct trans
 
 /* ---- rounds ---- */
 
-/* Unshot flux by weight of a side now, or an estimate from above of it. */
-static double due(const struct solver *v, uint32_t ps, int exact)
-{
-	const struct sender *s = &v->sender;
-	const uint64_t *first = v->t->target_link + ps;
-	size_t vectors = s->vectors, bands = (size_t)v->s->bands;
-	const lanes *weight = v->weight + v->parts.of[ps] * vectors;
-	uint32_t group = solution_group(v->s, v->t->m, ps);
-	lanes sum = { 0 };
-	double emission = 0;
-
-	for (size_t k = 0; k < bands; k++)
-		emission += v->s->unshot_emission[ps * bands + k];
-	emission *= ((const double *)weight)[group * bands];
-	for (size_t i = 0; i < vectors; i++)
-		sum += s->unshot_diffuse[ps * vectors + i] * weight[i];
-	if (!exact)
-		return emission + lanes_total(&sum, 1) + v->links[ps] +
-		       s->link_gain[ps] * v->weight_max[v->parts.of[ps]];
-	for (uint64_t l = 2 * first[0]; l < 2 * first[1]; l++)
-		for (size_t i = 0; i < vectors; i++)
-			sum += s->unshot_link[l * vectors + i] * weight[i];
-	return emission + lanes_total(&sum, 1);
-}
-
-/* Whether a side's turn has come, by its unshot flux now. Flux has only grown since the
- * survey, and running sums tell all but the close cases: links are many. */
-static int is_due(const struct solver *v, uint32_t ps)
-{
-	const double least = v->s->round[ROUND_LEAST], close = 1e-9;
-
-	if (v->priority[ps] > 0 && v->priority[ps] >= least)
-		return 1;
-	if (due(v, ps, 0) < least * (1 - close))
-		return 0;
-	double p = due(v, ps, 1);
-	return p > 0 && p >= least;
-}
-
 /* Lights come before the first round, whatever they are worth: they shoot once. 0 when the
  * last shot stopped it. */
 static int shoot_lights(struct solver *v, uint64_t last_shot)
@@ -128,15 +89,16 @@ static int shoot_lights(struct solver *v, uint64_t last_shot)
 static int finish_round(struct solver *v, uint64_t last_shot)
 {
 	struct solution *s = v->s;
+	const double least = s->round[ROUND_LEAST];
 
 	for (uint32_t ps = (uint32_t)s->round[ROUND_NEXT]; ps < s->patch_sides; ps++) {
-		if (!is_due(v, ps))
+		if (!solver_is_due(v, ps, least))
 			continue;
 		if (s->shots >= last_shot) {
 			s->round[ROUND_NEXT] = ps;
 			return 0;
 		}
-		solver_shoot(v, ps);
+		solver_shoot(v, ps, least);
 	}
 	s->round[ROUND_LEAST] = s->round[ROUND_NEXT] = 0;
 	return 1;
@@ -195,7 +157,7 @@ static int rounds(struct solver *v, const struct radiosity_options *o,
 			go_on = solver_overshoot(v, r->unshot, o->stop, e);
 		} else {
 			if (s->round[ROUND_LEAST] == 0)
-				s->round[ROUND_LEAST] = top / 2;
+				s->round[ROUND_LEAST] = top / 8;
 			go_on = finish_round(v, last);
 		}
 		top = solver_survey(v, &r->unshot);

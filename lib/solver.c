@@ -33,10 +33,33 @@ static void weigh_components(struct solver *v)
 	for (size_t i = 0; i < v->parts.n; i++)
 		for (size_t c = 0; c < v->sender.channels; c++) {
 			double emitted = v->emitted[i * s->groups + c / bands];
-			double weight = emitted > 0 ? 1 / emitted : 0;
-			((double *)(v->weight + i * vectors))[c] = weight;
-			v->weight_max[i] = fmax(v->weight_max[i], weight);
+			((double *)(v->weight + i * vectors))[c] = emitted > 0 ? 1 / emitted : 0;
 		}
+}
+
+static double row_cost(const struct transport *t, uint32_t row)
+{
+	/* Runs that a block's head and an account of the shot are worth. */
+	enum { HEAD = 16 };
+	uint64_t b = t->row_block[row], end = t->row_block[row + 1];
+
+	return (double)(t->block[end].run - t->block[b].run + HEAD * (1 + end - b));
+}
+
+static void set_costs(struct solver *v)
+{
+	const struct transport *t = v->t;
+
+	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++) {
+		uint32_t row[2] = { t->diffuse_row[ps], t->emission_row[ps] };
+		v->cost[ps] = row[0] == FF_NO_ROW && row[1] == FF_NO_ROW;
+		for (int k = 0; k < 2; k++)
+			v->cost[ps] = fmax(v->cost[ps], row[k] == FF_NO_ROW ? 0 : row_cost(t, row[k]));
+	}
+	for (size_t l = 0; l < t->links; l++)
+		for (size_t way = 0; way < 2; way++)
+			if (t->link_row[2 * l + way] != FF_NO_ROW)
+				v->link_cost[l] += row_cost(t, t->link_row[2 * l + way]);
 }
 
 static int new_arrays(struct solver *v, struct err *e)
@@ -44,17 +67,15 @@ static int new_arrays(struct solver *v, struct err *e)
 	size_t parts = v->parts.n, vectors = v->sender.vectors, sides = v->s->patch_sides;
 
 	v->emitted = mem_new(parts * v->s->groups, sizeof *v->emitted, "priorities", e);
-	v->weight_max = mem_new(parts, sizeof *v->weight_max, "priorities", e);
-	v->priority = mem_new(sides, sizeof *v->priority, "priorities", e);
-	v->links = mem_new(sides, sizeof *v->links, "priorities", e);
+	v->cost = mem_new(sides, sizeof *v->cost, "priorities", e);
+	v->link_cost = mem_new(v->t->links, sizeof *v->link_cost, "priorities", e);
 	v->weight = lanes_new(parts * vectors, &v->room[0], "priorities", e);
 	v->out = lanes_new(vectors, &v->room[1], "flux", e);
 	v->emission = lanes_new(vectors, &v->room[2], "flux", e);
 	v->diffuse = lanes_new(vectors, &v->room[3], "flux", e);
 	v->unshot = lanes_new(vectors, &v->room[4], "flux", e);
 	v->part = lanes_new(parts * vectors, &v->room[5], "priorities", e);
-	return v->emitted && v->part && v->weight_max && v->priority && v->links && v->weight &&
-	       v->out && v->emission && v->diffuse && v->unshot ? 0 : -1;
+	return v->emitted && v->part && v->cost && v->link_cost && v->weight && v->out && v->emission && v->diffuse && v->unshot ? 0 : -1;
 }
 
 int solver_init(struct solver *v, struct solution *s, const struct transport *t,
@@ -66,6 +87,7 @@ int solver_init(struct solver *v, struct solution *s, const struct transport *t,
 	    new_arrays(v, e))
 		return -1;
 	weigh_components(v);
+	set_costs(v);
 	for (uint32_t ps = 0; ps < s->patch_sides; ps++)
 		v->sides += t->diffuse_row[ps] != FF_NO_ROW || t->emission_row[ps] != FF_NO_ROW ||
 		            t->target_link[ps] < t->target_link[ps + 1];
@@ -77,9 +99,8 @@ void solver_free(struct solver *v)
 	for (size_t i = 0; i < sizeof v->room / sizeof *v->room; i++)
 		free(v->room[i]);
 	free(v->emitted);
-	free(v->weight_max);
-	free(v->priority);
-	free(v->links);
+	free(v->cost);
+	free(v->link_cost);
 	sent_free(&v->sent);
 	sender_free(&v->sender);
 	components_free(&v->parts);
@@ -155,14 +176,12 @@ double solver_survey(struct solver *v, double *worst)
 	memset(v->part, 0, v->parts.n * vectors * sizeof *v->part);
 	v->negative = 0;
 	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++) {
-		const uint64_t *first = v->t->target_link + ps;
-		v->links[ps] = s->link_gain[ps] = 0;
-		for (uint64_t l = 2 * first[0]; l < 2 * first[1]; l++)
-			v->links[ps] += count(v, ps, s->unshot_link + l * vectors);
 		load_emission(v, ps, v->emission);
-		v->priority[ps] = v->links[ps] + count(v, ps, v->emission) +
-		                  count(v, ps, s->unshot_diffuse + ps * vectors);
-		top = fmax(top, v->priority[ps]);
+		double own = count(v, ps, v->emission) +
+		             count(v, ps, s->unshot_diffuse + ps * vectors);
+		top = fmax(top, own / v->cost[ps]);
+		for (uint64_t l = 2 * v->t->target_link[ps]; l < 2 * v->t->target_link[ps + 1]; l++)
+			top = fmax(top, count(v, ps, s->unshot_link + l * vectors) / v->link_cost[l >> 1]);
 	}
 	for (uint32_t i = (uint32_t)v->s->patch_sides; i < v->s->sources; i++) {
 		load_emission(v, i, v->emission);
@@ -171,6 +190,56 @@ double solver_survey(struct solver *v, double *worst)
 	*worst = worst_part(v);
 	check_ledger(v);
 	return top;
+}
+
+/* ---- whose turn it is ---- */
+
+/* Magnitude of flux of a source by weight. */
+static double weigh(const struct solver *v, uint32_t source, const lanes *flux)
+{
+	const size_t vectors = v->sender.vectors;
+	const lanes *weight = v->weight + v->parts.of[source] * vectors;
+	lanes sum = { 0 };
+
+	for (size_t i = 0; i < vectors; i++)
+		sum += lanes_abs(flux[i]) * weight[i];
+	return lanes_total(&sum, 1);
+}
+
+/* Whether flux is unshot, and has a priority. */
+static int reaches(double flux, double cost, double least)
+{
+	return flux > 0 && flux >= least * cost;
+}
+
+static int own_is_due(const struct solver *v, uint32_t ps, double least)
+{
+	size_t bands = (size_t)v->s->bands;
+	const double *emission = v->s->unshot_emission + ps * bands;
+	const double *weight = (const double *)(v->weight + v->parts.of[ps] * v->sender.vectors);
+	double flux = 0;
+
+	for (size_t k = 0; k < bands; k++)
+		flux += emission[k];
+	flux *= weight[solution_group(v->s, v->t->m, ps) * bands];
+	flux += weigh(v, ps, v->sender.unshot_diffuse + ps * v->sender.vectors);
+	return reaches(flux, v->cost[ps], least);
+}
+
+static int link_is_due(const struct solver *v, uint32_t ps, uint64_t l, double least)
+{
+	return reaches(weigh(v, ps, v->sender.unshot_link + l * v->sender.vectors),
+	               v->link_cost[l >> 1], least);
+}
+
+int solver_is_due(const struct solver *v, uint32_t ps, double least)
+{
+	if (own_is_due(v, ps, least))
+		return 1;
+	for (uint64_t l = 2 * v->t->target_link[ps]; l < 2 * v->t->target_link[ps + 1]; l++)
+		if (link_is_due(v, ps, l, least))
+			return 1;
+	return 0;
 }
 
 /* ---- shots ---- */
@@ -243,16 +312,41 @@ static void take(lanes *from, lanes *to, lanes *out, size_t vectors)
 	}
 }
 
-static void shoot_links(struct solver *v, uint32_t ps)
+/* The next link due from l on. */
+static uint64_t next_link(const struct solver *v, uint32_t ps, uint64_t l, double least)
+{
+	const uint64_t end = 2 * v->t->target_link[ps + 1];
+
+	while (l < end && !link_is_due(v, ps, l, least))
+		l++;
+	return l;
+}
+
+/* Fetches what sending a link reads; its heads alone, or its runs by them. */
+static void fetch_link(const struct solver *v, uint32_t ps, uint64_t l, int runs)
+{
+	const uint32_t *row = v->t->link_row + (l & ~(uint64_t)1);
+
+	for (int way = 0; l < 2 * v->t->target_link[ps + 1] && way < 2; way++)
+		if (row[way] != FF_NO_ROW)
+			send_fetch(v->t, row[way], runs);
+}
+
+/* Links are short, so that reading them is waiting for memory: each is looked for two
+ * ahead. */
+static void shoot_links(struct solver *v, uint32_t ps, double least)
 {
 	const struct transport *t = v->t;
 	size_t vectors = v->sender.vectors;
 	lanes now[VECTORS_MAX];
+	uint64_t l = next_link(v, ps, 2 * t->target_link[ps], least), later, next;
 
-	for (uint64_t l = 2 * t->target_link[ps]; l < 2 * t->target_link[ps + 1]; l++) {
+	next = next_link(v, ps, l + 1, least);
+	for (; l < 2 * t->target_link[ps + 1]; l = next, next = later) {
 		lanes *u = v->sender.unshot_link + l * vectors;
-		if (!(lanes_magnitude(u, vectors) > 0))
-			continue;
+		later = next_link(v, ps, next + 1, least);
+		fetch_link(v, ps, later, 0);
+		fetch_link(v, ps, next, 1);
 		take(u, now, v->out, vectors);
 		solver_send_link(v, l, now, v->s->shot);
 	}
@@ -291,19 +385,25 @@ static void take_emission(struct solver *v, uint32_t source)
 		v->out[i] += v->emission[i];
 }
 
-void solver_shoot(struct solver *v, uint32_t ps)
+static void shoot_own(struct solver *v, uint32_t ps)
 {
 	const struct transport *t = v->t;
 	size_t vectors = v->sender.vectors;
 	uint32_t row = t->emission_row[ps] != FF_NO_ROW ? t->emission_row[ps] : t->diffuse_row[ps];
 
-	memset(v->out, 0, vectors * sizeof *v->out);
 	take_emission(v, ps);
 	take(v->sender.unshot_diffuse + ps * vectors, v->diffuse, v->out, vectors);
 	if (row != FF_NO_ROW)
 		shoot_row(v, row, FRESH, v->emission, NULL, v->s->shot);
 	solver_send_diffuse(v, ps, v->diffuse, v->s->shot);
-	shoot_links(v, ps);
+}
+
+void solver_shoot(struct solver *v, uint32_t ps, double least)
+{
+	memset(v->out, 0, v->sender.vectors * sizeof *v->out);
+	if (own_is_due(v, ps, least))
+		shoot_own(v, ps);
+	shoot_links(v, ps, least);
 	solver_book(v, v->out);
 	v->s->shots++;
 }

@@ -19,9 +19,8 @@ struct solver {
 	lanes *diffuse;          /* [vectors] and what was to leave diffusely */
 	double *emitted;         /* [components][groups] flux, all bands */
 	lanes *weight;           /* [components][vectors] 1 / emitted, by group */
-	double *weight_max;      /* [components] the largest */
-	double *priority;        /* [2P] unshot flux by weight when the round began */
-	double *links;           /* [2P] its part of a side's links */
+	double *cost;            /* [2P] of sending what leaves a side diffusely, in runs */
+	double *link_cost;       /* [links] of sending what leaves by lobes */
 	lanes *part;             /* [components][vectors] unshot flux by weight */
 	lanes *unshot;           /* [vectors] in all, then */
 	int negative;            /* some of it is below 0 */
@@ -38,13 +37,17 @@ void solver_free(struct solver *v);
 /* Flux that a source emits. */
 double solver_emitted(const struct model *m, uint32_t source, int band);
 
-/* Looks at all unshot flux: priority, links, unshot, negative. Returns the
- * largest priority; the worst component's and group's unshot over emitted flux goes to
+/* Looks at all unshot flux: unshot, negative. Returns the largest priority, which is flux
+ * by weight and cost; the worst component's and group's unshot over emitted flux goes to
  * *worst. Checks the ledger. O(sides + links). */
 double solver_survey(struct solver *v, double *worst);
 
-/* Sends all unshot flux of a patch-side; all of a light. */
-void solver_shoot(struct solver *v, uint32_t ps);
+/* Whether a patch-side has anything of that priority: what it emits and what is to leave
+ * diffusely, or what is to leave by the lobes of a link, fresh or mixed. */
+int solver_is_due(const struct solver *v, uint32_t ps, double least);
+
+/* Sends what has that priority; all of a light. */
+void solver_shoot(struct solver *v, uint32_t ps, double least);
 void solver_shoot_light(struct solver *v, uint32_t source);
 
 /* Sends flux to leave diffusely by a side, or by the lobes of link index l (2 link +

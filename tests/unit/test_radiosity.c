@@ -427,7 +427,7 @@ static void shoot_all(struct solver *v)
 
 	for (int i = 0; i < 100000 && worst > 1e-13; i++) {
 		for (uint32_t ps = 0; ps < v->s->patch_sides; ps++)
-			solver_shoot(v, ps);
+			solver_shoot(v, ps, 0);
 		solver_survey(v, &worst);
 	}
 	assert_true(worst <= 1e-13);
