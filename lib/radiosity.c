@@ -92,13 +92,12 @@ static int finish_round(struct solver *v, uint64_t last_shot)
 	const double least = s->round[ROUND_LEAST];
 
 	for (uint32_t ps = (uint32_t)s->round[ROUND_NEXT]; ps < s->patch_sides; ps++) {
-		if (!solver_is_due(v, ps, least))
-			continue;
-		if (s->shots >= last_shot) {
+		if (s->shots < last_shot) {
+			solver_shoot(v, ps, least);
+		} else if (solver_is_due(v, ps, least)) {
 			s->round[ROUND_NEXT] = ps;
 			return 0;
 		}
-		solver_shoot(v, ps, least);
 	}
 	s->round[ROUND_LEAST] = s->round[ROUND_NEXT] = 0;
 	return 1;

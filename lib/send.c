@@ -222,6 +222,19 @@ static ALWAYS_INLINE void land_special(const struct landing *l, uint64_t run, si
 	}
 }
 
+/* Links are all over memory: they are on the way while flux lands on plain sides. */
+static void fetch_links(const struct landing *l, uint64_t end)
+{
+	enum { MOST = 24 };
+	const uint32_t *link = l->s->t->run_link + l->block->link;
+	const uint64_t all = end - l->block->special, n = all < MOST ? all : MOST;
+
+	for (uint64_t i = 0; i < n; i++)
+		if (link[i] < RUN_FOLLOWED)
+			__builtin_prefetch(l->s->unshot_link + (2 * (size_t)(link[i] & ~RUN_GUESSED) +
+			                   (size_t)l->freshness) * l->n, 1);
+}
+
 static ALWAYS_INLINE void land_all(const struct landing *l, uint64_t i, uint64_t end, size_t N,
                                    size_t n, struct sent *sent)
 {
@@ -282,6 +295,7 @@ static void send_block(struct sender *s, const struct block *block, int freshnes
 	const uint64_t tile = s->vectors > LANDING_MAX ? TILE : end - block->run;
 	struct landing l = { s, block, 0, s->vectors, freshness, { { 0 } } };
 
+	fetch_links(&l, end);
 	for (uint64_t i = block->run; i < end; i += tile)
 		for (l.v = 0; l.v < l.n; l.v += LANDING_MAX) {
 			size_t N = l.n - l.v < LANDING_MAX ? l.n - l.v : LANDING_MAX;

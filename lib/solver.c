@@ -122,22 +122,52 @@ static void check_ledger(struct solver *v)
 	}
 }
 
-/* Counts unshot flux of a source; its magnitude by weight. */
-static double count(struct solver *v, uint32_t source, const lanes *flux)
-{
-	const size_t vectors = v->sender.vectors;
-	const lanes *weight = v->weight + v->parts.of[source] * vectors;
-	lanes *part = v->part + v->parts.of[source] * vectors, sum = { 0 }, below = { 0 };
+enum { FEW = 2 };
 
-	for (size_t i = 0; i < vectors; i++) {
-		lanes magnitude = lanes_abs(flux[i]), weighted = magnitude * weight[i];
-		v->unshot[i] += flux[i];
-		part[i] += weighted;
-		sum += weighted;
-		below += magnitude - flux[i];
+static inline void raise(double *top, double x)
+{
+	if (x > *top)
+		*top = x;
+}
+
+/* Counts items of unshot flux of a source, each two at a cost; the largest magnitude by
+ * weight and cost. Inlined with the number of vectors, n; few are summed in registers. */
+static ALWAYS_INLINE double count_as(struct solver *v, uint32_t source, const lanes *flux,
+                                     size_t items, const double *cost, size_t n, int few)
+{
+	const lanes *weight = v->weight + v->parts.of[source] * n;
+	lanes here[2 * FEW] = { 0 }, below = { 0 };
+	lanes *all = few ? here : v->unshot;
+	lanes *part = few ? here + FEW : v->part + v->parts.of[source] * n;
+	double top = 0;
+
+	for (size_t k = 0; k < items; k++, flux += n) {
+		lanes sum = { 0 };
+		for (size_t i = 0; i < n; i++) {
+			lanes magnitude = lanes_abs(flux[i]), weighted = magnitude * weight[i];
+			all[i] += flux[i];
+			part[i] += weighted;
+			sum += weighted;
+			below += magnitude - flux[i];
+		}
+		raise(&top, lanes_total(&sum, 1) / cost[k >> 1]);
+	}
+	for (size_t i = 0; few && i < n; i++) {
+		v->unshot[i] += all[i];
+		v->part[v->parts.of[source] * n + i] += part[i];
 	}
 	v->negative |= lanes_total(&below, 1) > 0;
-	return lanes_total(&sum, 1);
+	return top;
+}
+
+static double count(struct solver *v, uint32_t source, const lanes *flux, size_t items,
+                    const double *cost)
+{
+	switch (v->sender.vectors) {
+	case 1: return count_as(v, source, flux, items, cost, 1, 1);
+	case FEW: return count_as(v, source, flux, items, cost, FEW, 1);
+	default: return count_as(v, source, flux, items, cost, v->sender.vectors, 0);
+	}
 }
 
 /* The most that a component has unshot of a group, over what it emits of it. */
@@ -166,8 +196,38 @@ static void load_emission(const struct solver *v, uint32_t source, lanes *to)
 	       v->s->unshot_emission + source * bands, bands * sizeof(double));
 }
 
+/* Magnitude of flux by weight. */
+static inline double weigh(const lanes *weight, const lanes *flux, size_t n)
+{
+	lanes sum = { 0 };
+
+	for (size_t i = 0; i < n; i++)
+		sum += lanes_abs(flux[i]) * weight[i];
+	return lanes_total(&sum, 1);
+}
+
+static const lanes *weight_of(const struct solver *v, uint32_t source)
+{
+	return v->weight + v->parts.of[source] * v->sender.vectors;
+}
+
+/* What a side emits and has to send diffusely, by weight. */
+static double weigh_own(const struct solver *v, uint32_t ps)
+{
+	const size_t bands = (size_t)v->s->bands, n = v->sender.vectors;
+	const double *emission = v->s->unshot_emission + ps * bands;
+	const double *weight = (const double *)weight_of(v, ps);
+	double flux = 0;
+
+	for (size_t k = 0; k < bands; k++)
+		flux += emission[k];
+	return flux * weight[solution_group(v->s, v->t->m, ps) * bands] +
+	       weigh(weight_of(v, ps), v->sender.unshot_diffuse + ps * n, n);
+}
+
 double solver_survey(struct solver *v, double *worst)
 {
+	const struct transport *t = v->t;
 	struct sender *s = &v->sender;
 	size_t vectors = s->vectors;
 	double top = 0;
@@ -175,17 +235,18 @@ double solver_survey(struct solver *v, double *worst)
 	memset(v->unshot, 0, vectors * sizeof *v->unshot);
 	memset(v->part, 0, v->parts.n * vectors * sizeof *v->part);
 	v->negative = 0;
-	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++) {
-		load_emission(v, ps, v->emission);
-		double own = count(v, ps, v->emission) +
-		             count(v, ps, s->unshot_diffuse + ps * vectors);
-		top = fmax(top, own / v->cost[ps]);
-		for (uint64_t l = 2 * v->t->target_link[ps]; l < 2 * v->t->target_link[ps + 1]; l++)
-			top = fmax(top, count(v, ps, s->unshot_link + l * vectors) / v->link_cost[l >> 1]);
-	}
-	for (uint32_t i = (uint32_t)v->s->patch_sides; i < v->s->sources; i++) {
+	for (uint32_t i = 0; i < v->s->sources; i++) {
+		const int is_light = i >= v->s->patch_sides;
+		double no_cost = 1;
 		load_emission(v, i, v->emission);
-		count(v, i, v->emission);
+		count(v, i, v->emission, 1, &no_cost);
+		if (is_light)
+			continue;
+		uint64_t link = t->target_link[i], links = t->target_link[i + 1] - link;
+		raise(&top, weigh_own(v, i) / v->cost[i]);
+		count(v, i, s->unshot_diffuse + i * vectors, 1, v->cost + i);
+		raise(&top, count(v, i, s->unshot_link + 2 * link * vectors, 2 * links,
+		                  v->link_cost + link));
 	}
 	*worst = worst_part(v);
 	check_ledger(v);
@@ -193,18 +254,6 @@ double solver_survey(struct solver *v, double *worst)
 }
 
 /* ---- whose turn it is ---- */
-
-/* Magnitude of flux of a source by weight. */
-static double weigh(const struct solver *v, uint32_t source, const lanes *flux)
-{
-	const size_t vectors = v->sender.vectors;
-	const lanes *weight = v->weight + v->parts.of[source] * vectors;
-	lanes sum = { 0 };
-
-	for (size_t i = 0; i < vectors; i++)
-		sum += lanes_abs(flux[i]) * weight[i];
-	return lanes_total(&sum, 1);
-}
 
 /* Whether flux is unshot, and has a priority. */
 static int reaches(double flux, double cost, double least)
@@ -214,32 +263,28 @@ static int reaches(double flux, double cost, double least)
 
 static int own_is_due(const struct solver *v, uint32_t ps, double least)
 {
-	size_t bands = (size_t)v->s->bands;
-	const double *emission = v->s->unshot_emission + ps * bands;
-	const double *weight = (const double *)(v->weight + v->parts.of[ps] * v->sender.vectors);
-	double flux = 0;
-
-	for (size_t k = 0; k < bands; k++)
-		flux += emission[k];
-	flux *= weight[solution_group(v->s, v->t->m, ps) * bands];
-	flux += weigh(v, ps, v->sender.unshot_diffuse + ps * v->sender.vectors);
-	return reaches(flux, v->cost[ps], least);
+	return reaches(weigh_own(v, ps), v->cost[ps], least);
 }
 
-static int link_is_due(const struct solver *v, uint32_t ps, uint64_t l, double least)
+/* The first link of a side from l on that is due, by link and freshness; or where its
+ * links end. */
+static uint64_t next_link(const struct solver *v, uint32_t ps, uint64_t l, double least)
 {
-	return reaches(weigh(v, ps, v->sender.unshot_link + l * v->sender.vectors),
-	               v->link_cost[l >> 1], least);
+	const size_t n = v->sender.vectors;
+	const uint64_t end = 2 * v->t->target_link[ps + 1];
+	const lanes *weight = weight_of(v, ps), *flux = v->sender.unshot_link + l * n;
+
+	for (; l < end; l++, flux += n)
+		if (reaches(n == 1 ? weigh(weight, flux, 1) : weigh(weight, flux, n),
+		            v->link_cost[l >> 1], least))
+			break;
+	return l;
 }
 
 int solver_is_due(const struct solver *v, uint32_t ps, double least)
 {
-	if (own_is_due(v, ps, least))
-		return 1;
-	for (uint64_t l = 2 * v->t->target_link[ps]; l < 2 * v->t->target_link[ps + 1]; l++)
-		if (link_is_due(v, ps, l, least))
-			return 1;
-	return 0;
+	return own_is_due(v, ps, least) ||
+	       next_link(v, ps, 2 * v->t->target_link[ps], least) < 2 * v->t->target_link[ps + 1];
 }
 
 /* ---- shots ---- */
@@ -312,16 +357,6 @@ static void take(lanes *from, lanes *to, lanes *out, size_t vectors)
 	}
 }
 
-/* The next link due from l on. */
-static uint64_t next_link(const struct solver *v, uint32_t ps, uint64_t l, double least)
-{
-	const uint64_t end = 2 * v->t->target_link[ps + 1];
-
-	while (l < end && !link_is_due(v, ps, l, least))
-		l++;
-	return l;
-}
-
 /* Fetches what sending a link reads; its heads alone, or its runs by them. */
 static void fetch_link(const struct solver *v, uint32_t ps, uint64_t l, int runs)
 {
@@ -333,16 +368,18 @@ static void fetch_link(const struct solver *v, uint32_t ps, uint64_t l, int runs
 }
 
 /* Links are short, so that reading them is waiting for memory: each is looked for two
- * ahead. */
-static void shoot_links(struct solver *v, uint32_t ps, double least)
+ * ahead. Whether there were any. */
+static int shoot_links(struct solver *v, uint32_t ps, double least)
 {
 	const struct transport *t = v->t;
 	size_t vectors = v->sender.vectors;
 	lanes now[VECTORS_MAX];
-	uint64_t l = next_link(v, ps, 2 * t->target_link[ps], least), later, next;
+	const uint64_t first = 2 * t->target_link[ps], end = 2 * t->target_link[ps + 1];
+	uint64_t l = next_link(v, ps, first, least), later, next = l;
 
-	next = next_link(v, ps, l + 1, least);
-	for (; l < 2 * t->target_link[ps + 1]; l = next, next = later) {
+	if (l == end)
+		return 0;
+	for (next = next_link(v, ps, l + 1, least); l < end; l = next, next = later) {
 		lanes *u = v->sender.unshot_link + l * vectors;
 		later = next_link(v, ps, next + 1, least);
 		fetch_link(v, ps, later, 0);
@@ -350,6 +387,7 @@ static void shoot_links(struct solver *v, uint32_t ps, double least)
 		take(u, now, v->out, vectors);
 		solver_send_link(v, l, now, v->s->shot);
 	}
+	return 1;
 }
 
 void solver_book(struct solver *v, const lanes *out)
@@ -400,10 +438,13 @@ static void shoot_own(struct solver *v, uint32_t ps)
 
 void solver_shoot(struct solver *v, uint32_t ps, double least)
 {
+	const int own = own_is_due(v, ps, least);
+
 	memset(v->out, 0, v->sender.vectors * sizeof *v->out);
-	if (own_is_due(v, ps, least))
+	if (own)
 		shoot_own(v, ps);
-	shoot_links(v, ps, least);
+	if (!shoot_links(v, ps, least) && !own)
+		return;
 	solver_book(v, v->out);
 	v->s->shots++;
 }

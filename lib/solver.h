@@ -46,7 +46,7 @@ double solver_survey(struct solver *v, double *worst);
  * diffusely, or what is to leave by the lobes of a link, fresh or mixed. */
 int solver_is_due(const struct solver *v, uint32_t ps, double least);
 
-/* Sends what has that priority; all of a light. */
+/* A shot of what has that priority, if anything; one of all of a light. */
 void solver_shoot(struct solver *v, uint32_t ps, double least);
 void solver_shoot_light(struct solver *v, uint32_t source);
 
