@@ -5,6 +5,7 @@
 
 #include "bsdf.h"
 #include "mem.h"
+#include "send_exact.h"
 
 /* How the sides of materials split the flux that arrives on them. */
 static void fill_parts(struct sender *s)
@@ -142,14 +143,23 @@ static void take(struct sender *s, uint32_t chain, double *x)
 	memset(flux, 0, s->channels * sizeof *flux);
 }
 
+/* Enters what became of flux in vector v. */
+static inline void book(const struct sender *s, lanes *to, size_t v, lanes flux)
+{
+	to[v] += flux;
+	if (s->exact)
+		exact_book(s->exact, v, flux);
+}
+
 static void finish(struct sender *s, lanes *cut)
 {
-	double x[CHANNELS_MAX];
+	lanes x[VECTORS_MAX];
 
 	for (size_t i = 0; i < s->touches; i++) {
-		take(s, s->touched[i], x);
-		for (size_t c = 0; cut && c < s->channels; c++)
-			((double *)cut)[c] += x[c];
+		x[s->vectors - 1] = (lanes){ 0 };
+		take(s, s->touched[i], (double *)x);
+		for (size_t v = 0; cut && v < s->vectors; v++)
+			book(s, cut, v, x[v]);
 		s->is_touched[s->touched[i]] = 0;
 	}
 	s->touches = 0;
@@ -295,6 +305,13 @@ static void send_block(struct sender *s, const struct block *block, int freshnes
 	const uint64_t tile = s->vectors > LANDING_MAX ? TILE : end - block->run;
 	struct landing l = { s, block, 0, s->vectors, freshness, { { 0 } } };
 
+	s->runs += end - block->run;
+	s->bytes += (double)(end - block->run) * (sizeof *t->run_target + sizeof *t->run_sum) +
+	            (double)(end - block->special) * sizeof *t->run_link;
+	if (s->exact) {
+		exact_land(s, block, freshness, in, sent);
+		return;
+	}
 	fetch_links(&l, end);
 	for (uint64_t i = block->run; i < end; i += tile)
 		for (l.v = 0; l.v < l.n; l.v += LANDING_MAX) {
@@ -302,9 +319,6 @@ static void send_block(struct sender *s, const struct block *block, int freshnes
 			memcpy(l.x, in + l.v, N * sizeof *in);
 			land(&l, N, i, i + tile < end ? i + tile : end, sent);
 		}
-	s->runs += end - block->run;
-	s->bytes += (double)(end - block->run) * (sizeof *t->run_target + sizeof *t->run_sum) +
-	            (double)(end - block->special) * sizeof *t->run_link;
 }
 
 /* What goes on from a block, x its flux by unit of the values; go_round has what comes
@@ -312,7 +326,7 @@ static void send_block(struct sender *s, const struct block *block, int freshnes
 static void send_on(struct sender *s, const struct block *block, const double *x)
 {
 	for (uint64_t i = block->onward; i < block[1].onward; i++)
-		if (block->chain == 0 || s->t->onward[i].chain != block->chain)
+		if (s->t->onward[i].chain != block->chain)
 			into_chain(s, &s->t->onward[i], x);
 }
 
@@ -333,20 +347,19 @@ static void loop_gain(const struct sender *s, const struct block *block, double 
 static void go_round(struct sender *s, const struct block *block, double *in, lanes *cut)
 {
 	double gain[BANDS_MAX];
+	lanes ever[VECTORS_MAX];
 
 	if (block->chain == 0 || !(block->sum > 0) || block->onward == block[1].onward)
 		return;
 	loop_gain(s, block, gain);
+	memset(ever, 0, s->vectors * sizeof *ever);
 	for (size_t c = 0; c < s->channels; c++) {
 		double g = gain[c % (size_t)s->bands];
-		if (g < 1 - 1e-9) {
-			in[c] /= 1 - g;
-		} else {
-			if (cut)
-				((double *)cut)[c] += in[c];
-			in[c] = 0;
-		}
+		((double *)ever)[c] = g < 1 - 1e-9 ? 0 : in[c];
+		in[c] = g < 1 - 1e-9 ? in[c] / (1 - g) : 0;
 	}
+	for (size_t v = 0; cut && v < s->vectors; v++)
+		book(s, cut, v, ever[v]);
 }
 
 void send_fetch(const struct transport *t, uint32_t row, int runs)
@@ -386,10 +399,10 @@ void send_row(struct sender *s, uint32_t row, int freshness, const lanes *flux,
 		go_round(s, block, (double *)in, sent->cut);
 		for (size_t v = 0; v < n; v++) {
 			in[v] /= block->sum > 0 ? block->sum : 1;
-			sent->escaped[v] += in[v] * block->escape;
-			sent->absorbed[v] += in[v] * block->black;
-			sent->lost[v] += in[v] * block->lost;
-			sent->cut[v] += in[v] * block->cut;
+			book(s, sent->escaped, v, in[v] * block->escape);
+			book(s, sent->absorbed, v, in[v] * block->black);
+			book(s, sent->lost, v, in[v] * block->lost);
+			book(s, sent->cut, v, in[v] * block->cut);
 		}
 		send_block(s, block, freshness, in, sent);
 		send_on(s, block, (double *)in);

@@ -28,6 +28,7 @@ struct sender {
 	uint8_t *is_touched;
 	size_t touches;
 	double bytes;            /* of runs read by it */
+	struct exact *exact;     /* NULL, or flux is sent without loss to rounding */
 };
 
 /* What becomes of flux arriving: reflected and transmitted diffusely, by all finite

@@ -406,7 +406,7 @@ void solver_book(struct solver *v, const lanes *out)
 		s->ledger[LEDGER_LOST * channels + c] += lost[c];
 		s->ledger[LEDGER_CUT * channels + c] += cut[c];
 		v->guessed += ((const double *)v->sent.guessed)[c];
-		if (s->ledger[c] > 0)
+		if (taken && s->ledger[c] > 0)
 			v->residual = fmax(v->residual,
 			                   fabs(taken[c] - gone - kept[c]) / s->ledger[c]);
 	}
