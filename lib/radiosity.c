@@ -38,6 +38,9 @@ static int solution_arrays(struct solution *s, const struct model *m,
 	       s->unshot_diffuse && s->unshot_link && s->shot && s->ledger ? 0 : -1;
 }
 
+/* Flux that can be squared, for variances. */
+static const double brightest = 1e150;
+
 int solution_begin(struct solution *s, const struct model *m, const struct transport *t,
                    int light_groups, struct err *e)
 {
@@ -58,8 +61,9 @@ int solution_begin(struct solution *s, const struct model *m, const struct trans
 		return err_set(e, "no emitter: nothing in this scene gives light; give a material "
 		               "emission (glTF emissiveFactor, or emission_front in its extras) or "
 		               "add a light (KHR_lights_punctual)");
-	if (!isfinite(all))
-		return err_set(e, "the emitted flux is not a finite number");
+	if (!(all < brightest))
+		return err_set(e, "the emitted flux, %g, is too large to compute with; lower the "
+		               "emission of the materials and lights", all);
 	return 0;
 }
 

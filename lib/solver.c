@@ -10,15 +10,20 @@
 
 /* ---- the beginning and the end ---- */
 
+/* Less is no light: what becomes of it would not have all its digits. */
+static const double dimmest = 1e-200;
+
 double solver_emitted(const struct model *m, uint32_t source, int band)
 {
+	double flux = 0;
+
 	if (source >= 2 * m->patches)
-		return light_flux(m, source - 2 * m->patches, band);
-	if (!model_side_modelled(m, source))
-		return 0;
-	return m->patch_area[source >> 1] *
-	       bsdf_exitance(&m->material, model_patch_material(m, source >> 1),
-	                     (int)(source & 1), band);
+		flux = light_flux(m, source - 2 * m->patches, band);
+	else if (model_side_modelled(m, source))
+		flux = m->patch_area[source >> 1] *
+		       bsdf_exitance(&m->material, model_patch_material(m, source >> 1),
+		                     (int)(source & 1), band);
+	return flux > dimmest ? flux : 0;
 }
 
 static void weigh_components(struct solver *v)

@@ -34,7 +34,7 @@ int solver_init(struct solver *v, struct solution *s, const struct transport *t,
                 struct err *e);
 void solver_free(struct solver *v);
 
-/* Flux that a source emits. */
+/* Flux that a source emits; 0 if it is too dim to compute with. */
 double solver_emitted(const struct model *m, uint32_t source, int band);
 
 /* Looks at all unshot flux: unshot, negative. Returns the largest priority, which is flux
