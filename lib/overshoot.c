@@ -246,14 +246,12 @@ static void shoot_side(struct krylov *k, uint32_t ps, lanes *d)
 	struct sender *s = &v->sender;
 	const struct transport *t = v->t;
 	size_t n = k->vectors;
-	lanes share[2 * VECTORS_MAX];
+	const lanes *share = sender_share(s, ps);
 
 	limit(k, t->diffuse_row[ps], MIXED, NULL, d + ps * n);
 	exact_take(s, exact_diffuse(s, ps), d + ps * n);
 	solver_send_diffuse(v, ps, d + ps * n, v->s->shot);
 	exact_return(s, exact_diffuse(s, ps), &v->sent);
-	if (t->target_link[ps] < t->target_link[ps + 1])
-		solver_lobe_shares(v, ps, share);
 	for (uint64_t l = 2 * t->target_link[ps]; l < 2 * t->target_link[ps + 1]; l++) {
 		lanes *flux = d + (v->s->patch_sides + l) * n;
 		for (uint64_t way = 0; way < 2; way++)

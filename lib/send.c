@@ -18,23 +18,23 @@ static void fill_parts(struct sender *s)
 		int side = (int)(i & 1);
 		size_t at = material_at(mt, material, side);
 		double *part = (double *)(s->part + i * PARTS * s->vectors);
+		double *share = (double *)(s->share + i * 2 * s->vectors);
 		int lobe_r = bsdf_has_lobe(mt, material, side, 0);
 		int lobe_t = bsdf_has_lobe(mt, material, side, 1);
 		for (size_t c = 0; c < s->channels; c++) {
 			size_t k = c % (size_t)s->bands;
 			part[PART_RHO * width + c] = mt->rho_d[at + k];
 			part[PART_TAU * width + c] = mt->tau_d[at + k];
-			part[PART_LOBES * width + c] = (lobe_r ? mt->rho_s[at + k] : 0) +
-			                               (lobe_t ? mt->tau_s[at + k] : 0);
+			double r = lobe_r ? mt->rho_s[at + k] : 0, t = lobe_t ? mt->tau_s[at + k] : 0;
+			part[PART_LOBES * width + c] = r + t;
+			share[c] = r > 0 ? r / (r + t) : 0;
+			share[width + c] = r + t > 0 ? 1 - share[c] : 0;
 			part[PART_ABSORBED * width + c] =
 				1 - bsdf_albedo(mt, material, side, (int)k);
 		}
 	}
-	for (uint32_t ps = 0; ps < 2 * s->m->patches; ps++) {
+	for (uint32_t ps = 0; ps < 2 * s->m->patches; ps++)
 		s->surface[ps] = 2 * model_patch_material(s->m, ps >> 1) + (ps & 1);
-		memcpy(s->rho + ps * s->vectors, s->part + (s->surface[ps] * PARTS + PART_RHO) * s->vectors,
-		       s->vectors * sizeof *s->rho);
-	}
 }
 
 int sent_new(struct sent *x, size_t vectors, struct err *e)
@@ -71,9 +71,9 @@ int sender_init(struct sender *s, const struct transport *t, size_t groups, stru
 	s->touched = mem_new(t->chains.n, sizeof *s->touched, "chain flux", e);
 	s->is_touched = mem_new(t->chains.n, 1, "chain flux", e);
 	s->part = lanes_new(2 * t->m->material.n * PARTS * s->vectors, &s->room[0], "albedos", e);
-	s->rho = lanes_new(2 * t->m->patches * s->vectors, &s->room[3], "albedos", e);
+	s->share = lanes_new(2 * t->m->material.n * 2 * s->vectors, &s->room[3], "albedos", e);
 	s->surface = mem_new(2 * t->m->patches, sizeof *s->surface, "albedos", e);
-	if (!s->chain_flux || !s->touched || !s->is_touched || !s->part || !s->rho || !s->surface)
+	if (!s->chain_flux || !s->touched || !s->is_touched || !s->part || !s->share || !s->surface)
 		return -1;
 	fill_parts(s);
 	return 0;
@@ -187,10 +187,10 @@ struct landed {
 static ALWAYS_INLINE void land_plain(const struct landing *l, uint64_t run, size_t N, size_t n,
                                      struct landed *sum)
 {
-	const size_t at = l->s->t->run_target[run] * n + l->v;
+	const uint32_t target = l->s->t->run_target[run];
 	const double value = l->s->t->run_sum[run];
-	const lanes *rho = l->s->rho + at;
-	lanes *unshot = l->s->unshot_diffuse + at;
+	const lanes *rho = l->s->part + l->s->surface[target] * PARTS * n + l->v;
+	lanes *unshot = l->s->unshot_diffuse + target * n + l->v;
 
 	for (size_t i = 0; i < N; i++) {
 		lanes x = l->x[i] * value, same = rho[i] * x;

@@ -19,7 +19,7 @@ struct sender {
 	uint64_t runs;           /* read by send_row */
 	uint32_t *surface;       /* [2P] material and side, an index of part */
 	lanes *part;             /* [2 materials][PARTS][vectors] of flux arriving */
-	lanes *rho;              /* [2P][vectors] PART_RHO of each side */
+	lanes *share;            /* [2 materials][2][vectors] of what leaves by lobes, by R and T */
 	lanes *unshot_diffuse;   /* [2P][vectors] as in solution.h, see sender_load */
 	lanes *unshot_link;      /* [links][2][vectors] */
 	void *room[4];           /* memory of these */
@@ -55,6 +55,12 @@ void sender_free(struct sender *s);
  * 0, or -1 and e. */
 int sender_load(struct sender *s, const struct solution *sol, struct err *e);
 void sender_store(const struct sender *s, struct solution *sol);
+
+/* The shares of what leaves a side by its lobes that go by R and by T, [2][vectors]. */
+static inline const lanes *sender_share(const struct sender *s, uint32_t ps)
+{
+	return s->share + s->surface[ps] * 2 * s->vectors;
+}
 
 /* Sends flux, which may be negative, by a row into the sender's unshot flux; adds to
  * `sent`. */

@@ -318,32 +318,11 @@ void solver_send_diffuse(struct solver *v, uint32_t ps, const lanes *flux, doubl
 		shoot_row(v, v->t->diffuse_row[ps], MIXED, flux, NULL, shot);
 }
 
-void solver_lobe_shares(const struct solver *v, uint32_t ps, lanes *share)
-{
-	const struct model *m = v->t->m;
-	const struct materials *mt = &m->material;
-	uint32_t material = model_patch_material(m, ps >> 1);
-	size_t at = material_at(mt, material, (int)(ps & 1)), vectors = v->sender.vectors;
-	int lobe_r = bsdf_has_lobe(mt, material, (int)(ps & 1), 0);
-	int lobe_t = bsdf_has_lobe(mt, material, (int)(ps & 1), 1);
-	double *r = (double *)share, *t = (double *)(share + vectors);
-
-	memset(share, 0, 2 * vectors * sizeof *share);
-	for (size_t c = 0; c < v->sender.channels; c++) {
-		size_t k = c % (size_t)m->bands;
-		double rho = lobe_r ? mt->rho_s[at + k] : 0;
-		double tau = lobe_t ? mt->tau_s[at + k] : 0;
-		r[c] = rho + tau > 0 ? rho / (rho + tau) : 0;
-		t[c] = rho + tau > 0 ? 1 - r[c] : 0;
-	}
-}
-
 void solver_send_link(struct solver *v, uint64_t l, const lanes *flux, double *shot)
 {
 	const struct transport *t = v->t;
-	lanes share[2 * VECTORS_MAX];
+	const lanes *share = sender_share(&v->sender, t->link_target[l >> 1]);
 
-	solver_lobe_shares(v, t->link_target[l >> 1], share);
 	for (uint64_t way = 0; way < 2; way++) {
 		uint32_t row = t->link_row[(l & ~(uint64_t)1) + way];
 		if (row != FF_NO_ROW)

@@ -56,9 +56,6 @@ void solver_shoot_light(struct solver *v, uint32_t source);
 void solver_send_diffuse(struct solver *v, uint32_t ps, const lanes *flux, double *shot);
 void solver_send_link(struct solver *v, uint64_t l, const lanes *flux, double *shot);
 
-/* The shares of a target's directional flux that leave by R and by T, [2][vectors]. */
-void solver_lobe_shares(const struct solver *v, uint32_t ps, lanes *share);
-
 /* Books v->sent in the ledger, where `out` was taken from unshot flux; NULL if that is
  * accounted for (send_exact.h). */
 void solver_book(struct solver *v, const lanes *out);
