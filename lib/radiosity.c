@@ -109,20 +109,26 @@ static int finish_round(struct solver *v, uint64_t last_shot)
 
 /* ---- when to overshoot ---- */
 
+/* Enters what has been read since the last time. */
+static void count_work(struct solver *v)
+{
+	v->s->round[ROUND_WORK] += (double)(v->sender.runs - v->counted);
+	v->counted = v->sender.runs;
+}
+
 /* Whether shots would go on for longer than overshooting takes, by how much the last
- * sweeps (as many shots as there are sides) have brought. */
+ * sweeps (as many runs as there are) have brought. */
 static int is_slow(struct solver *v, double unshot, double stop)
 {
 	enum { SWEEPS = 2, WORTH = 20 };
-	double *round = v->s->round, shots = (double)v->s->shots, sides = (double)v->sides;
+	double *round = v->s->round, sweeps = round[ROUND_WORK] / (double)v->t->runs;
 
 	if (v->negative)
 		return 1;
-	if (shots - round[ROUND_SHOTS] < SWEEPS * sides)
+	if (!(sweeps >= SWEEPS))
 		return 0;
-	double sweeps = (shots - round[ROUND_SHOTS]) / sides;
 	double rate = round[ROUND_UNSHOT] > 0 ? log(round[ROUND_UNSHOT] / unshot) / sweeps : INFINITY;
-	round[ROUND_SHOTS] = shots;
+	round[ROUND_WORK] = 0;
 	round[ROUND_UNSHOT] = unshot;
 	return stop > 0 && log(unshot / stop) > WORTH * rate;
 }
@@ -143,6 +149,10 @@ static void tell(const struct solver *v, const struct radiosity_hooks *hooks,
 	            unshot, emitted, v->residual });
 }
 
+/* A round goes down to a part of the largest priority. The more rounds, the better the order
+ * of shots, but each looks at all links. */
+enum { DEPTH = 8 };
+
 /* Rounds, or overshooting where they are slow, until `stop` or the last shot. */
 static int rounds(struct solver *v, const struct radiosity_options *o,
                   const struct radiosity_hooks *hooks, struct radiosity_report *r,
@@ -160,10 +170,11 @@ static int rounds(struct solver *v, const struct radiosity_options *o,
 			go_on = solver_overshoot(v, r->unshot, o->stop, e);
 		} else {
 			if (s->round[ROUND_LEAST] == 0)
-				s->round[ROUND_LEAST] = top / 8;
+				s->round[ROUND_LEAST] = top / DEPTH;
 			go_on = finish_round(v, last);
 		}
 		top = solver_survey(v, &r->unshot);
+		count_work(v);
 		r->rounds++;
 		tell(v, hooks, r);
 	}

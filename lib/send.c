@@ -224,8 +224,7 @@ static ALWAYS_INLINE void land_special(const struct landing *l, uint64_t run, si
 		if (to) {
 			to[i] += lobes;
 			sum[i].kept += lobes;
-			if (link & RUN_GUESSED)
-				sum[i].guessed += lobes;
+			sum[i].guessed += lanes_if(lobes, (link & RUN_GUESSED) != 0);
 		} else if (link == FF_NO_ROW) {
 			sum[i].cut += lobes;
 		}

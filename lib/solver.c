@@ -93,9 +93,6 @@ int solver_init(struct solver *v, struct solution *s, const struct transport *t,
 		return -1;
 	weigh_components(v);
 	set_costs(v);
-	for (uint32_t ps = 0; ps < s->patch_sides; ps++)
-		v->sides += t->diffuse_row[ps] != FF_NO_ROW || t->emission_row[ps] != FF_NO_ROW ||
-		            t->target_link[ps] < t->target_link[ps + 1];
 	return 0;
 }
 

@@ -24,7 +24,7 @@ struct solver {
 	lanes *part;             /* [components][vectors] unshot flux by weight */
 	lanes *unshot;           /* [vectors] in all, then */
 	int negative;            /* some of it is below 0 */
-	size_t sides;            /* that can shoot */
+	uint64_t counted;        /* sender.runs that round[ROUND_WORK] has */
 	double guessed, residual;
 	void *room[6];           /* memory of the vectors */
 };
