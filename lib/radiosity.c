@@ -151,7 +151,7 @@ static void tell(const struct solver *v, const struct radiosity_hooks *hooks,
 
 /* A round goes down to a part of the largest priority. The more rounds, the better the order
  * of shots, but each looks at all links. */
-enum { DEPTH = 8 };
+enum { DEPTH = 32 };
 
 /* Rounds, or overshooting where they are slow, until `stop` or the last shot. */
 static int rounds(struct solver *v, const struct radiosity_options *o,

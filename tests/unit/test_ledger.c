@@ -13,8 +13,8 @@
 
 static const double zero[3] = { 0, 0, 0 };
 
-static const struct ff_options rays = { .method = FF_RAYS, .rays = 1024, .points = 1,
-	.emitter_gain = 1, .lobe_rays = 512, .depth = 256, .seed = 1, .part = 1, .parts = 1,
+static const struct ff_options rays = { .method = FF_RAYS, .rays = 256, .points = 1,
+	.emitter_gain = 1, .lobe_rays = 256, .depth = 256, .seed = 1, .part = 1, .parts = 1,
 	.threads = 2 };
 
 /* Coefficients of light on a side, in each band: rho_d, tau_d, rho_s, tau_s. */
