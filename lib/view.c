@@ -20,6 +20,9 @@ enum {
  * for. */
 static const double usual_error = .1;
 
+/* The same of samples of a lobe. */
+static const double usual_lobe_error = .05;
+
 /* Variance of the mean of n samples that are stratified over a pixel over that of samples
  * which are not, divided by sqrt(n). Measured at edges, with 2 to 16 samples. */
 static const double stratified = .2;
@@ -205,6 +208,12 @@ static void keep_sample(const struct view_walker *w, size_t bands, const struct 
 	memset(to->square + at, 0, size);
 }
 
+/* Is there light that is computed, rather than interpolated? */
+static int shades(const struct render *r)
+{
+	return r->v->method != VIEW_MESH || (r->v->lobes && r->o->lobe_samples);
+}
+
 /* Tells what light is needed for a tile. */
 static void ask_tiles(void *arg, size_t begin, size_t end, int thread)
 {
@@ -212,7 +221,8 @@ static void ask_tiles(void *arg, size_t begin, size_t end, int thread)
 	struct worker *k = &r->worker[thread];
 
 	for (size_t t = begin; t < end; t++) {
-		struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack, .shader = &k->shader };
+		struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack, .shader = &k->shader,
+			                 .asking = 1 };
 		struct tile tile = tile_at(r, t);
 		for (int p = 0; p < tile.pixels; p++)
 			for (int s = 0; s < r->o->samples; s++)
@@ -324,7 +334,7 @@ static void trace_round(const struct render *r, struct worker *k, const struct t
 static void trace_tile(const struct render *r, struct worker *k, size_t t)
 {
 	struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack,
-		                 .shader = r->v->method == VIEW_MESH ? NULL : &k->shader };
+		                 .shader = shades(r) ? &k->shader : NULL };
 	struct tile tile = tile_at(r, t);
 	struct tile_sum *sum = &r->tile[t];
 
@@ -378,11 +388,12 @@ static int new_worker(const struct render *r, struct worker *k, int thread, stru
 	k->stack = mem_new(view_stack_size(r->o), sizeof *k->stack, "ray stacks", e);
 	if (!k->stack || new_sums(&k->slots, ROUND * values, e) || new_sums(&k->sums, values, e))
 		return -1;
-	if (r->v->method == VIEW_MESH)
+	if (!shades(r))
 		return 0;
-	double relative = r->o->relative > 0 ? r->o->relative / 2
-	                                     : fmin(1, usual_error * sqrt(r->o->samples));
-	return view_shader_init(&k->shader, r->v, r->gather, relative, thread, e);
+	double relative = r->o->relative / 2, usual = sqrt(r->o->samples);
+	return view_shader_init(&k->shader, r->v, r->gather,
+	                        relative > 0 ? relative : fmin(1, usual_error * usual),
+	                        relative > 0 ? relative : fmin(1, usual_lobe_error * usual), thread, e);
 }
 
 static void free_workers(struct render *r)

@@ -89,9 +89,9 @@ static int tabulate(struct view_scene *v, struct err *e)
 	for (size_t i = 0; v->side && i < sides; i++) {
 		tabulate_side(&v->m->material, i / 2, (int)(i % 2), &v->side[i]);
 		v->tails |= v->side[i].reflected.coefficient || v->side[i].transmitted.coefficient;
-		v->highlights |= v->m->light.n && (is_finite(&v->side[i].reflected) ||
-		                                   is_finite(&v->side[i].transmitted));
+		v->lobes |= is_finite(&v->side[i].reflected) || is_finite(&v->side[i].transmitted);
 	}
+	v->highlights = v->lobes && v->m->light.n;
 	return v->side ? 0 : -1;
 }
 
@@ -101,6 +101,14 @@ static const unsigned interpolated[] = { PART_ALL, PART_CAUSTIC | PART_INDIRECT,
 /* Errors of interpolated irradiance over those that the solution states of elements, of
  * noise and of discretisation: fits to several elements take part of both out. Measured. */
 static const double noise_left = .22, discretisation_left = .6;
+
+double view_blurred(const struct view_scene *v, size_t at, double part)
+{
+	double noise = v->s->error ? v->s->error[at] : 0;
+	double missed = v->s->discretisation ? discretisation_left * v->s->discretisation[at] : 0;
+
+	return fmin(noise_left * noise_left, part) * noise * noise + fmin(1, part) * missed * missed;
+}
 
 /* Group 0 of a solution with the parts that are interpolated alone, in arrays of its own. */
 static int part_solution(const struct solution *s, unsigned parts, struct solution *out, struct err *e)
@@ -187,7 +195,7 @@ struct view_scene *view_scene_new(const struct model *m, const struct solution *
 	v->rays = rays;
 	v->method = method;
 	if (!tabulate(v, e) && !interpolate(v, s, threads, e) && !find_misses(v, s, threads, e) &&
-	    (method == VIEW_MESH || (v->direct = direct_new(m, rays, e)))) {
+	    ((method == VIEW_MESH && !v->lobes) || (v->direct = direct_new(m, rays, e)))) {
 		if (v->tails)
 			find_ceiling(v);
 		return v;

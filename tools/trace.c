@@ -475,7 +475,7 @@ int main(int argc, char **argv)
 		         .about = "Render views of a solved scene, following mirrors and panes.",
 		         .options = option_table, .uses_threads = 1 },
 		.method = VIEW_DIRECT,
-		.view = { .depth = 32, .cutoff = 1e-3 }
+		.view = { .depth = 32, .cutoff = 1e-3, .lobe_samples = VIEW_LOBE_ENOUGH }
 	};
 	struct err e = { 0 };
 	int status = 0;
