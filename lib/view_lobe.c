@@ -26,7 +26,8 @@ static double per_density(const struct view_lobe_seen *l, enum lobe_kind kind, d
 {
 	return kind == LOBE_RECIPROCAL
 	     ? cos_i / fmax(cos_i, l->cosine)
-	     : cos_i / l->cosine * lobe_normaliser(l->k, l->cosine) / lobe_normaliser(l->k, cos_i);
+	     : cos_i / l->cosine * lobe_table_normaliser(l->table, l->cosine) /
+	       lobe_table_normaliser(l->table, cos_i);
 }
 
 /* That samples are taken by, of solid angle. */
@@ -35,7 +36,7 @@ static double density(const struct view_lobe_seen *l, enum lobe_kind kind, const
 	double power = lobe_power(l->k, v3_dot(l->axis, dir));
 
 	return kind == LOBE_RECIPROCAL ? (l->k + 1) / (2 * pi) * power
-	                               : power / lobe_normaliser(l->k, l->cosine);
+	                               : power / lobe_table_normaliser(l->table, l->cosine);
 }
 
 static double weight_at(const double dir[3], const void *arg)
@@ -47,7 +48,7 @@ static double weight_at(const double dir[3], const void *arg)
 		return 0;
 	return w->kind == LOBE_RECIPROCAL
 	     ? (w->l->k + 1) / (2 * pi) * power * cos_i / fmax(cos_i, w->l->cosine)
-	     : power * cos_i / (w->l->cosine * lobe_normaliser(w->l->k, cos_i));
+	     : power * cos_i / (w->l->cosine * lobe_table_normaliser(w->l->table, cos_i));
 }
 
 struct direct_weight view_lobe_weight(const struct view_lobe_weight *w)

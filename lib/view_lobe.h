@@ -7,6 +7,7 @@
 /* A lobe that a ray meets. */
 struct view_lobe_seen {
 	double k, axis[3], normal[3];  /* normal: of the side that its light arrives on */
+	const struct lobe_table *table;
 	double cosine;                 /* of the axis to the normal */
 	double x[3];                   /* the point, on its surface */
 	uint32_t element;

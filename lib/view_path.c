@@ -198,7 +198,7 @@ static void branch_into(struct view_walker *w, const struct view_branch *b, cons
 {
 	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
 	struct view_lobe_seen l = { .k = lobe->k, .cosine = fmax(p->cosine, 1e-14),
-	                            .element = p->element, .side = side };
+	                            .element = p->element, .side = side, .table = &lobe->table };
 
 	if (w->asking)
 		return;

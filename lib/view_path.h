@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "direct.h"
+#include "lobe_table.h"
 #include "reconstruct.h"
 #include "view.h"
 
@@ -13,6 +14,7 @@
 struct view_lobe {
 	const double *coefficient;  /* [bands], NULL where there is none */
 	double k;
+	struct lobe_table table;    /* of a finite lobe */
 };
 
 struct view_side {

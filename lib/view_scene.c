@@ -8,12 +8,14 @@
 
 static const double pi = 3.14159265358979323846;
 
-static struct view_lobe lobe_of(const double *coefficient, int bands, double k)
+static void make_lobe(struct view_lobe *lobe, const double *coefficient, int bands, double k)
 {
+	lobe->k = k;
 	for (int b = 0; b < bands; b++)
 		if (coefficient[b] > 0)
-			return (struct view_lobe){ coefficient, k };
-	return (struct view_lobe){ NULL, 0 };
+			lobe->coefficient = coefficient;
+	if (lobe->coefficient && !isinf(k))
+		lobe_table_make(&lobe->table, k);
 }
 
 static void tabulate_side(const struct materials *mt, size_t material, int side,
@@ -29,10 +31,9 @@ static void tabulate_side(const struct materials *mt, size_t material, int side,
 		s->translucent |= s->across[b] > 0;
 		s->emits |= mt->emission[here + (size_t)b] > 0;
 	}
-	s->reflected = lobe_of(&mt->rho_s[here], mt->bands,
-	                       mt->alpha[2 * material + (size_t)side]);
-	s->transmitted = lobe_of(&mt->tau_s[across], mt->bands,
-	                         mt->beta[2 * material + (size_t)!side]);
+	make_lobe(&s->reflected, &mt->rho_s[here], mt->bands, mt->alpha[2 * material + (size_t)side]);
+	make_lobe(&s->transmitted, &mt->tau_s[across], mt->bands,
+	          mt->beta[2 * material + (size_t)!side]);
 }
 
 /* U with L_e + M/pi + s U <= U for what one corner of an element-side shows, s its
