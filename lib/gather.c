@@ -108,7 +108,7 @@ uint64_t gather_rays(const struct gather *g)
 	uint64_t sum = 0;
 
 	for (int t = 0; t < g->o.threads; t++)
-		sum += g->worker[t].rays;
+		sum += g->worker[t].rays + g->worker[t].tails->rays;
 	return sum;
 }
 

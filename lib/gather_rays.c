@@ -170,18 +170,17 @@ int gather_worker_init(struct gather_worker *w, const struct gather_table *t,
                        const struct view_scene *v, int depth, struct err *e)
 {
 	*w = (struct gather_worker){ .t = t };
-	w->o = (struct view_options){ .samples = 1, .lobe_samples = 1, .depth = depth,
-	                              .cutoff = 1e-3, .threads = 1 };
-	w->stack = mem_new(view_stack_size(&w->o), sizeof *w->stack, "ray stacks", e);
-	w->walker = (struct view_walker){ .v = v, .stack = w->stack, .unlit = 1 };
+	w->tails = mem_new(1, sizeof *w->tails, "gathering", e);
 	w->direct = direct_worker_new(v->direct, e);
-	return w->stack && w->direct ? 0 : -1;
+	if (w->tails)
+		w->tails->depth = depth;
+	return w->tails && w->direct ? 0 : -1;
 }
 
 void gather_worker_free(struct gather_worker *w)
 {
 	direct_worker_free(w->direct);
-	free(w->stack);
+	free(w->tails);
 }
 
 /* ---- rays ---- */
@@ -246,24 +245,16 @@ static void aim(double frame[3][3], const float *u0, const float *u1, struct ray
 	}
 }
 
-/* Follows a ray that meets something directional again, from the beginning. */
-static void add_tail(struct gather_worker *w, const double x[3], const struct ray_batch *b, uint32_t i,
-                     uint64_t seed, double *sum)
+size_t gather_met(const struct gather_table *t, const struct ray_batch *b, uint32_t i, double *l)
 {
-	struct view_walker *k = &w->walker;
-	struct view_branch branch = { .index = i, .seed = seed };
-	size_t bands = (size_t)k->v->m->bands;
+	size_t bands = (size_t)t->v->m->bands;
+	float w1 = b->w[0][i], w2 = b->w[1][i];
+	size_t place = 2 * (size_t)locate(&t->locator, b->triangle[i], w1, w2) + b->side[i];
+	const float *c = t->radiance + 3 * bands * place;
 
-	memset(k->diffuse, 0, bands * sizeof *k->diffuse);
-	memset(k->directional, 0, bands * sizeof *k->directional);
-	memcpy(branch.org, x, sizeof branch.org);
-	for (int j = 0; j < 3; j++)
-		branch.dir[j] = (double)b->dir[j][i];
-	v3_normalise(branch.dir);
-	k->o = &w->o;
-	view_follow(k, &branch);
-	for (size_t j = 0; j < bands; j++)
-		sum[j] += k->diffuse[j] + k->directional[j];
+	for (size_t k = 0; k < bands; k++)
+		l[k] = fmax(0, (double)(c[k] + c[bands + k] * w1 + c[2 * bands + k] * w2));
+	return place;
 }
 
 /* The radiance of a rough side that is met close to x, with its direct light computed; 0 if
@@ -277,8 +268,8 @@ static int close_by(struct gather_worker *w, const double x[3], uint32_t triangl
 	const struct view_side *s =
 		&v->side[2 * model_patch_material(v->m, v->m->element_patch[place / 2]) + place % 2];
 	const float *rest = w->t->rest + 3 * bands * place;
-	static const double nothing[BANDS_MAX];
 	double at[3], d[3], h[BANDS_MAX], error[BANDS_MAX], p = (double)w1, q = (double)w2;
+	double corner[3] = { 1. / 3, 1. / 3, 1. / 3 }, usual[BANDS_MAX];
 
 	for (size_t k = 0; k < 3; k++)
 		at[k] = (1 - p - q) * v->m->vertex[3 * (size_t)c[0] + k] +
@@ -293,7 +284,8 @@ static int close_by(struct gather_worker *w, const double x[3], uint32_t triangl
 		if (!(side ? s->translucent : s->diffuse))
 			continue;
 		direct_begin(w->direct, (uint32_t)place ^ (uint32_t)side);
-		if (direct_at(w->direct, at, place, ROUGHLY, nothing, h, error, &w->e))
+		reconstruction_at(&v->all, place / 2, (int)(place % 2) ^ side, corner, usual);
+		if (direct_at(w->direct, at, place, ROUGHLY, usual, h, error, &w->e))
 			return 1;
 		for (size_t b = 0; b < bands; b++)
 			sum[b] += part[b] * h[b];
@@ -307,24 +299,27 @@ static void add_batch(struct gather_worker *w, const double x[3], struct ray_bat
 {
 	const struct gather_table *t = w->t;
 	size_t bands = (size_t)t->v->m->bands;
+	struct gather_going begun = { .depth = 0 };
 
+	for (size_t k = 0; k < bands; k++)
+		begun.weight[k] = 1;
 	ray_nearest_batch(t->v->rays, b, n);
 	w->rays += n;
 	for (uint32_t i = 0; i < n; i++) {
+		double l[BANDS_MAX];
 		if (b->triangle[i] == RAY_MISS)
 			continue;
-		float w1 = b->w[0][i], w2 = b->w[1][i];
-		size_t place = 2 * (size_t)locate(&t->locator, b->triangle[i], w1, w2) + b->side[i];
-		const float *c = t->radiance + 3 * bands * place;
-		if (t->kind[place] & GATHER_TAIL)
-			add_tail(w, x, b, i, seed, sum);
-		else if (!(t->kind[place] & GATHER_ROUGH) ||
-		         !close_by(w, x, b->triangle[i], place, w1, w2, sum))
-			for (size_t k = 0; k < bands; k++) {
-				float l = c[k] + c[bands + k] * w1 + c[2 * bands + k] * w2;
-				sum[k] += l > 0 ? (double)l : 0;
-			}
+		size_t place = gather_met(t, b, i, l);
+		if (t->kind[place] & GATHER_TAIL) {
+			begun.random = rng_seed(seed, i);
+			gather_go_on(w->tails, t, b, i, place, &begun);
+		} else if (t->kind[place] & GATHER_ROUGH &&
+		           close_by(w, x, b->triangle[i], place, b->w[0][i], b->w[1][i], sum))
+			continue;
+		for (size_t k = 0; k < bands; k++)
+			sum[k] += l[k];
 	}
+	gather_follow(w->tails, t, RAY_BATCH - 1, sum);
 }
 
 /* Adds the radiance that points [first, first + n) of a scramble find. */
@@ -348,6 +343,7 @@ static void add_rays(struct gather_worker *w, const double x[3], double frame[3]
 			          rng_mix(seed + first + at + i), sum);
 		}
 	}
+	gather_follow(w->tails, w->t, 0, sum);
 }
 
 /* Irradiance from the sums of parts of `rays` rays each, and its standard error. 1 if that

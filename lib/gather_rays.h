@@ -2,6 +2,7 @@
 #ifndef TWOPASS_GATHER_RAYS_H
 #define TWOPASS_GATHER_RAYS_H
 
+#include "gather_tail.h"
 #include "locate.h"
 #include "view_path.h"
 
@@ -24,9 +25,7 @@ enum { GATHER_TAIL = 1, GATHER_ROUGH = 2 };
 /* One thread's. */
 struct gather_worker {
 	const struct gather_table *t;
-	struct view_walker walker;  /* for tails */
-	struct view_options o;
-	struct view_branch *stack;
+	struct gather_tails *tails;
 	struct direct_worker *direct;
 	struct err e;
 	uint64_t rays;
@@ -40,6 +39,9 @@ void gather_table_free(struct gather_table *t);
 int gather_worker_init(struct gather_worker *w, const struct gather_table *t,
                        const struct view_scene *v, int depth, struct err *e);
 void gather_worker_free(struct gather_worker *w);
+
+/* The radiance M / pi of what ray i of a batch met, into l[bands]; returns its element-side. */
+size_t gather_met(const struct gather_table *t, const struct ray_batch *b, uint32_t i, double *l);
 
 /* Indirect irradiance at a point that has left its surface, whose side has unit normal n:
  * pi times the mean radiance of `rays` rays by the cosine; with relative > 0 as many as it

@@ -231,6 +231,5 @@ void view_lobe_follow(struct view_walker *w, const struct view_branch *b,
 		w->cut[k] = cut[k] + w->cut[k] / n;
 		w->error[k] += sqrt(w->blurred[k] / n);
 	}
-	if (w->shader)
-		put_light(&r, parts, n, lit);
+	put_light(&r, parts, n, lit);
 }

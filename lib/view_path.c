@@ -153,7 +153,7 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b, str
 	}
 	if (s->diffuse || s->translucent)
 		add_error(w, b, p);
-	if (!s->emits || w->unlit)
+	if (!s->emits)
 		return;
 	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] };
 	bsdf_emission(w->v->m, p->material, p->n, out, h);
@@ -271,7 +271,7 @@ void view_follow(struct view_walker *w, struct view_branch *b)
 	for (int i = 0; i < w->v->m->bands; i++)
 		b->weight[i] = 1;
 	b->depth = b->lobes = b->straight = 0;
-	b->passes = !w->unlit;
+	b->passes = 1;
 	b->share = 1;
 	follow_branch(w, b);
 	view_run(w, 0);

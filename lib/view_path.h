@@ -77,10 +77,9 @@ struct view_shader;
 struct view_walker {
 	const struct view_scene *v;
 	const struct view_options *o;
-	struct view_shader *shader; /* for points whose light is to be computed; NULL: none is */
+	struct view_shader *shader; /* for points and lobes whose light is to be computed; NULL:
+	                               there are none */
 	uint32_t slot;              /* of the sample, that it is told with them */
-	int unlit;                  /* emitters are black, and so are all backs of one-sided
-	                               materials: what gathering finds */
 	int asking;                 /* lobes are not sampled: light is only asked for */
 	struct view_branch *stack;
 	size_t waiting;
