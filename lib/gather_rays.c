@@ -14,7 +14,7 @@ enum {
 	GATHER_BITS = 1 << 12,  /* points of the sequence that are kept */
 	PARTS = 4,              /* of the sequence, that a standard error comes from */
 	FIRST = 64, MOST = 1 << 14, /* rays of a part where an error is aimed at */
-	AT_ONCE = 512,          /* rays that are sorted by direction: eight for each of */
+	AT_ONCE = GATHER_AT_ONCE, /* rays that are sorted by direction: eight for each of */
 	CELLS = 8               /* so many squared cells, exactly, when they are aligned */
 };
 
@@ -257,40 +257,74 @@ size_t gather_met(const struct gather_table *t, const struct ray_batch *b, uint3
 	return place;
 }
 
-/* The radiance of a rough side that is met close to x, with its direct light computed; 0 if
- * it is not close. */
-static int close_by(struct gather_worker *w, const double x[3], uint32_t triangle, size_t place,
-                    float w1, float w2, double *sum)
+/* Puts what ray i of a batch met among what is close to x and rough. 0 if it is not close. */
+static int put_close(struct gather_worker *w, const double x[3], const struct ray_batch *b, uint32_t i,
+                     size_t place)
 {
+	const struct model *m = w->t->v->m;
+	const uint32_t *c = &m->triangle[3 * (size_t)b->triangle[i]];
+	struct gather_close *to = &w->close[w->closes];
+	double d[3];
+
+	to->w[0] = (double)b->w[0][i];
+	to->w[1] = (double)b->w[1][i];
+	to->place = place;
+	for (size_t k = 0; k < 3; k++)
+		to->x[k] = (1 - to->w[0] - to->w[1]) * m->vertex[3 * (size_t)c[0] + k] +
+		           to->w[0] * m->vertex[3 * (size_t)c[1] + k] +
+		           to->w[1] * m->vertex[3 * (size_t)c[2] + k];
+	v3_sub(to->x, x, d);
+	if (v3_dot(d, d) > CLOSE * CLOSE * m->element_area[place / 2])
+		return 0;
+	w->closes++;
+	return 1;
+}
+
+/* Adds the radiance of a point with its direct light computed. */
+static void add_close(struct gather_worker *w, const struct gather_close *p, double *sum)
+{
+	static const double middle[3] = { 1. / 3, 1. / 3, 1. / 3 };
 	const struct view_scene *v = w->t->v;
-	const uint32_t *c = &v->m->triangle[3 * (size_t)triangle];
 	size_t bands = (size_t)v->m->bands;
 	const struct view_side *s =
-		&v->side[2 * model_patch_material(v->m, v->m->element_patch[place / 2]) + place % 2];
-	const float *rest = w->t->rest + 3 * bands * place;
-	double at[3], d[3], h[BANDS_MAX], error[BANDS_MAX], p = (double)w1, q = (double)w2;
-	double corner[3] = { 1. / 3, 1. / 3, 1. / 3 }, usual[BANDS_MAX];
+		&v->side[2 * model_patch_material(v->m, v->m->element_patch[p->place / 2]) + p->place % 2];
+	const float *rest = w->t->rest + 3 * bands * p->place;
+	double h[BANDS_MAX], error[BANDS_MAX], usual[BANDS_MAX];
 
-	for (size_t k = 0; k < 3; k++)
-		at[k] = (1 - p - q) * v->m->vertex[3 * (size_t)c[0] + k] +
-		        p * v->m->vertex[3 * (size_t)c[1] + k] + q * v->m->vertex[3 * (size_t)c[2] + k];
-	v3_sub(at, x, d);
-	if (v3_dot(d, d) > CLOSE * CLOSE * v->m->element_area[place / 2])
-		return 0;
 	for (size_t b = 0; b < bands; b++)
-		sum[b] += fmax(0, (double)rest[b] + (double)rest[bands + b] * p + (double)rest[2 * bands + b] * q);
-	for (int side = 0; side < 2; side++) {
-		const double *part = side ? s->across : s->here;
-		if (!(side ? s->translucent : s->diffuse))
+		sum[b] += fmax(0, (double)rest[b] + (double)rest[bands + b] * p->w[0] +
+		                  (double)rest[2 * bands + b] * p->w[1]);
+	for (int across = 0; across < 2; across++) {
+		const double *part = across ? s->across : s->here;
+		int side = (int)(p->place % 2) ^ across;
+		if (!(across ? s->translucent : s->diffuse))
 			continue;
-		direct_begin(w->direct, (uint32_t)place ^ (uint32_t)side);
-		reconstruction_at(&v->all, place / 2, (int)(place % 2) ^ side, corner, usual);
-		if (direct_at(w->direct, at, place, ROUGHLY, usual, h, error, &w->e))
-			return 1;
+		direct_begin(w->direct, (uint32_t)(p->place / 2 * 2) + (uint32_t)side);
+		reconstruction_at(&v->all, p->place / 2, side, middle, usual);
+		if (direct_at(w->direct, p->x, p->place, ROUGHLY, usual, h, error, &w->e))
+			return;
 		for (size_t b = 0; b < bands; b++)
 			sum[b] += part[b] * h[b];
 	}
-	return 1;
+}
+
+static int by_place(const void *x, const void *y)
+{
+	const struct gather_close *a = x, *b = y;
+
+	return a->place != b->place ? (a->place > b->place) - (a->place < b->place)
+	                            : (a->turn > b->turn) - (a->turn < b->turn);
+}
+
+/* Adds what is close, side by side: points of one share what is between it and emitters. */
+static void add_closes(struct gather_worker *w, double *sum)
+{
+	for (uint32_t i = 0; i < w->closes; i++)
+		w->close[i].turn = i;
+	qsort(w->close, w->closes, sizeof *w->close, by_place);
+	for (uint32_t i = 0; i < w->closes && !w->e.set; i++)
+		add_close(w, &w->close[i], sum);
+	w->closes = 0;
 }
 
 /* Adds the radiance that the rays of a batch find. */
@@ -313,9 +347,9 @@ static void add_batch(struct gather_worker *w, const double x[3], struct ray_bat
 		if (t->kind[place] & GATHER_TAIL) {
 			begun.random = rng_seed(seed, i);
 			gather_go_on(w->tails, t, b, i, place, &begun);
-		} else if (t->kind[place] & GATHER_ROUGH &&
-		           close_by(w, x, b->triangle[i], place, b->w[0][i], b->w[1][i], sum))
+		} else if (t->kind[place] & GATHER_ROUGH && put_close(w, x, b, i, place)) {
 			continue;
+		}
 		for (size_t k = 0; k < bands; k++)
 			sum[k] += l[k];
 	}
@@ -342,6 +376,7 @@ static void add_rays(struct gather_worker *w, const double x[3], double frame[3]
 			add_batch(w, x, &b, some - i < RAY_BATCH ? some - i : RAY_BATCH,
 			          rng_mix(seed + first + at + i), sum);
 		}
+		add_closes(w, sum);
 	}
 	gather_follow(w->tails, w->t, 0, sum);
 }

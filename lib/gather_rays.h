@@ -22,10 +22,21 @@ struct gather_table {
  * tell: it is computed where rays meet such a side close by. */
 enum { GATHER_TAIL = 1, GATHER_ROUGH = 2 };
 
+/* A point close to the one in work where direct light is computed. */
+struct gather_close {
+	size_t place;               /* element-side */
+	uint32_t turn;
+	double x[3], w[2];          /* world; weights of corners 1 and 2 of its triangle */
+};
+
+enum { GATHER_AT_ONCE = 512 };      /* rays of a point that are looked at together */
+
 /* One thread's. */
 struct gather_worker {
 	const struct gather_table *t;
 	struct gather_tails *tails;
+	struct gather_close close[GATHER_AT_ONCE];
+	uint32_t closes;
 	struct direct_worker *direct;
 	struct err e;
 	uint64_t rays;
