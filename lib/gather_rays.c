@@ -14,7 +14,7 @@ enum {
 	GATHER_BITS = 1 << 12,  /* points of the sequence that are kept */
 	PARTS = 4,              /* of the sequence, that a standard error comes from */
 	FIRST = 64, MOST = 1 << 14, /* rays of a part where an error is aimed at */
-	AT_ONCE = GATHER_AT_ONCE, /* rays that are sorted by direction: eight for each of */
+	AT_ONCE = 512,          /* rays that are sorted by direction: eight for each of */
 	CELLS = 8               /* so many squared cells, exactly, when they are aligned */
 };
 
@@ -245,27 +245,42 @@ static void aim(double frame[3][3], const float *u0, const float *u1, struct ray
 	}
 }
 
-size_t gather_met(const struct gather_table *t, const struct ray_batch *b, uint32_t i, double *l)
+void gather_places(const struct gather_table *t, const struct ray_batch *b, uint32_t n,
+                   uint32_t place[RAY_BATCH])
+{
+	/* Many loads from all over the tables at a time take little longer than one. */
+	for (uint32_t i = 0; i < n; i++)
+		if (b->triangle[i] != RAY_MISS) {
+			place[i] = 2 * locate(&t->locator, b->triangle[i], b->w[0][i], b->w[1][i]) + b->side[i];
+			__builtin_prefetch(&t->radiance[3 * (size_t)t->v->m->bands * place[i]]);
+			__builtin_prefetch(&t->kind[place[i]]);
+		}
+}
+
+void gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_t i, uint32_t place,
+                const double *weight, double *sum)
 {
 	size_t bands = (size_t)t->v->m->bands;
-	float w1 = b->w[0][i], w2 = b->w[1][i];
-	size_t place = 2 * (size_t)locate(&t->locator, b->triangle[i], w1, w2) + b->side[i];
 	const float *c = t->radiance + 3 * bands * place;
+	float w1 = b->w[0][i], w2 = b->w[1][i];
 
-	for (size_t k = 0; k < bands; k++)
-		l[k] = fmax(0, (double)(c[k] + c[bands + k] * w1 + c[2 * bands + k] * w2));
-	return place;
+	for (size_t k = 0; k < bands; k++) {
+		float l = c[k] + c[bands + k] * w1 + c[2 * bands + k] * w2;
+		sum[k] += l > 0 ? weight[k] * (double)l : 0;
+	}
 }
 
 /* Puts what ray i of a batch met among what is close to x and rough. 0 if it is not close. */
 static int put_close(struct gather_worker *w, const double x[3], const struct ray_batch *b, uint32_t i,
-                     size_t place)
+                     size_t place, double *sum)
 {
 	const struct model *m = w->t->v->m;
 	const uint32_t *c = &m->triangle[3 * (size_t)b->triangle[i]];
 	struct gather_close *to = &w->close[w->closes];
 	double d[3];
 
+	to->turn = w->closes;
+	to->sum = sum;
 	to->w[0] = (double)b->w[0][i];
 	to->w[1] = (double)b->w[1][i];
 	to->place = place;
@@ -281,7 +296,7 @@ static int put_close(struct gather_worker *w, const double x[3], const struct ra
 }
 
 /* Adds the radiance of a point with its direct light computed. */
-static void add_close(struct gather_worker *w, const struct gather_close *p, double *sum)
+static void add_close(struct gather_worker *w, const struct gather_close *p)
 {
 	static const double middle[3] = { 1. / 3, 1. / 3, 1. / 3 };
 	const struct view_scene *v = w->t->v;
@@ -292,8 +307,8 @@ static void add_close(struct gather_worker *w, const struct gather_close *p, dou
 	double h[BANDS_MAX], error[BANDS_MAX], usual[BANDS_MAX];
 
 	for (size_t b = 0; b < bands; b++)
-		sum[b] += fmax(0, (double)rest[b] + (double)rest[bands + b] * p->w[0] +
-		                  (double)rest[2 * bands + b] * p->w[1]);
+		p->sum[b] += fmax(0, (double)rest[b] + (double)rest[bands + b] * p->w[0] +
+		                     (double)rest[2 * bands + b] * p->w[1]);
 	for (int across = 0; across < 2; across++) {
 		const double *part = across ? s->across : s->here;
 		int side = (int)(p->place % 2) ^ across;
@@ -304,7 +319,7 @@ static void add_close(struct gather_worker *w, const struct gather_close *p, dou
 		if (direct_at(w->direct, p->x, p->place, ROUGHLY, usual, h, error, &w->e))
 			return;
 		for (size_t b = 0; b < bands; b++)
-			sum[b] += part[b] * h[b];
+			p->sum[b] += part[b] * h[b];
 	}
 }
 
@@ -317,13 +332,11 @@ static int by_place(const void *x, const void *y)
 }
 
 /* Adds what is close, side by side: points of one share what is between it and emitters. */
-static void add_closes(struct gather_worker *w, double *sum)
+static void add_closes(struct gather_worker *w)
 {
-	for (uint32_t i = 0; i < w->closes; i++)
-		w->close[i].turn = i;
 	qsort(w->close, w->closes, sizeof *w->close, by_place);
 	for (uint32_t i = 0; i < w->closes && !w->e.set; i++)
-		add_close(w, &w->close[i], sum);
+		add_close(w, &w->close[i]);
 	w->closes = 0;
 }
 
@@ -334,24 +347,25 @@ static void add_batch(struct gather_worker *w, const double x[3], struct ray_bat
 	const struct gather_table *t = w->t;
 	size_t bands = (size_t)t->v->m->bands;
 	struct gather_going begun = { .depth = 0 };
+	uint32_t place[RAY_BATCH];
 
 	for (size_t k = 0; k < bands; k++)
 		begun.weight[k] = 1;
+	if (w->closes + n > GATHER_CLOSES)
+		add_closes(w);
 	ray_nearest_batch(t->v->rays, b, n);
+	gather_places(t, b, n, place);
 	w->rays += n;
 	for (uint32_t i = 0; i < n; i++) {
-		double l[BANDS_MAX];
 		if (b->triangle[i] == RAY_MISS)
 			continue;
-		size_t place = gather_met(t, b, i, l);
-		if (t->kind[place] & GATHER_TAIL) {
+		if (t->kind[place[i]] & GATHER_TAIL) {
 			begun.random = rng_seed(seed, i);
-			gather_go_on(w->tails, t, b, i, place, &begun);
-		} else if (t->kind[place] & GATHER_ROUGH && put_close(w, x, b, i, place)) {
+			gather_go_on(w->tails, t, b, i, place[i], &begun);
+		} else if (t->kind[place[i]] & GATHER_ROUGH && put_close(w, x, b, i, place[i], sum)) {
 			continue;
 		}
-		for (size_t k = 0; k < bands; k++)
-			sum[k] += l[k];
+		gather_add(t, b, i, place[i], begun.weight, sum);
 	}
 	gather_follow(w->tails, t, RAY_BATCH - 1, sum);
 }
@@ -376,7 +390,6 @@ static void add_rays(struct gather_worker *w, const double x[3], double frame[3]
 			add_batch(w, x, &b, some - i < RAY_BATCH ? some - i : RAY_BATCH,
 			          rng_mix(seed + first + at + i), sum);
 		}
-		add_closes(w, sum);
 	}
 	gather_follow(w->tails, w->t, 0, sum);
 }
@@ -412,6 +425,7 @@ void gather_point(struct gather_worker *w, const double x[3], const double n[3],
 	memcpy(frame[2], n, sizeof frame[2]);
 	for (uint32_t p = 0; p < PARTS; p++)
 		add_rays(w, x, frame, seed, p * each, each, part[p]);
+	add_closes(w);
 	while (!settled(part, bands, each, relative, scale, h, error) && relative > 0 && each < MOST) {
 		/* As many again: the parts so far are half as many, twice as long. */
 		each *= 2;
@@ -422,5 +436,6 @@ void gather_point(struct gather_worker *w, const double x[3], const double n[3],
 		}
 		for (uint32_t p = 2; p < PARTS; p++)
 			add_rays(w, x, frame, seed, p * each, each, part[p]);
+		add_closes(w);
 	}
 }

@@ -25,17 +25,18 @@ enum { GATHER_TAIL = 1, GATHER_ROUGH = 2 };
 /* A point close to the one in work where direct light is computed. */
 struct gather_close {
 	size_t place;               /* element-side */
-	uint32_t turn;
+	uint32_t turn;              /* in which it was met */
 	double x[3], w[2];          /* world; weights of corners 1 and 2 of its triangle */
+	double *sum;                /* that its radiance goes into */
 };
 
-enum { GATHER_AT_ONCE = 512 };      /* rays of a point that are looked at together */
+enum { GATHER_CLOSES = 2048 };
 
 /* One thread's. */
 struct gather_worker {
 	const struct gather_table *t;
 	struct gather_tails *tails;
-	struct gather_close close[GATHER_AT_ONCE];
+	struct gather_close close[GATHER_CLOSES];
 	uint32_t closes;
 	struct direct_worker *direct;
 	struct err e;
@@ -51,8 +52,13 @@ int gather_worker_init(struct gather_worker *w, const struct gather_table *t,
                        const struct view_scene *v, int depth, struct err *e);
 void gather_worker_free(struct gather_worker *w);
 
-/* The radiance M / pi of what ray i of a batch met, into l[bands]; returns its element-side. */
-size_t gather_met(const struct gather_table *t, const struct ray_batch *b, uint32_t i, double *l);
+/* The element-sides that the first n rays of a batch met, those of misses apart. */
+void gather_places(const struct gather_table *t, const struct ray_batch *b, uint32_t n,
+                   uint32_t place[RAY_BATCH]);
+
+/* Adds weight[bands] times the radiance M / pi of what ray i of a batch met. */
+void gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_t i, uint32_t place,
+                const double *weight, double *sum);
 
 /* Indirect irradiance at a point that has left its surface, whose side has unit normal n:
  * pi times the mean radiance of `rays` rays by the cosine; with relative > 0 as many as it

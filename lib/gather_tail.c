@@ -137,21 +137,19 @@ static uint32_t take(struct gather_tails *s)
 
 void gather_follow(struct gather_tails *s, const struct gather_table *t, uint32_t left, double *sum)
 {
-	size_t bands = (size_t)t->v->m->bands;
+	uint32_t place[RAY_BATCH];
 
 	while (s->waiting > left) {
 		uint32_t n = take(s);
 		ray_nearest_batch(t->v->rays, &s->batch, n);
+		gather_places(t, &s->batch, n, place);
 		s->rays += n;
 		for (uint32_t i = 0; i < n; i++) {
-			double l[BANDS_MAX];
 			if (s->batch.triangle[i] == RAY_MISS)
 				continue;
-			size_t place = gather_met(t, &s->batch, i, l);
-			for (size_t k = 0; k < bands; k++)
-				sum[k] += s->now[i].weight[k] * l[k];
-			if (t->kind[place] & GATHER_TAIL)
-				gather_go_on(s, t, &s->batch, i, place, &s->now[i]);
+			gather_add(t, &s->batch, i, place[i], s->now[i].weight, sum);
+			if (t->kind[place[i]] & GATHER_TAIL)
+				gather_go_on(s, t, &s->batch, i, place[i], &s->now[i]);
 		}
 	}
 }
