@@ -15,6 +15,7 @@ enum {
 	PARTS = 4,              /* of the sequence, that a standard error comes from */
 	FIRST = 64, MOST = 1 << 14, /* rays of a part where an error is aimed at */
 	AT_ONCE = 512,          /* rays that are sorted by direction: eight for each of */
+	ERRORS = 8,             /* of so many rays the error of the solution is asked for */
 	CELLS = 8               /* so many squared cells, exactly, when they are aligned */
 };
 
@@ -270,29 +271,27 @@ void gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_
 	}
 }
 
-/* Puts what ray i of a batch met among what is close to x and rough. 0 if it is not close. */
-static int put_close(struct gather_worker *w, const double x[3], const struct ray_batch *b, uint32_t i,
-                     size_t place, double *sum)
+static void hit_point(const struct model *m, uint32_t triangle, double p, double q, double x[3])
 {
-	const struct model *m = w->t->v->m;
-	const uint32_t *c = &m->triangle[3 * (size_t)b->triangle[i]];
-	struct gather_close *to = &w->close[w->closes];
-	double d[3];
+	const uint32_t *c = &m->triangle[3 * (size_t)triangle];
 
-	to->turn = w->closes;
+	for (size_t k = 0; k < 3; k++)
+		x[k] = (1 - p - q) * m->vertex[3 * (size_t)c[0] + k] +
+		       p * m->vertex[3 * (size_t)c[1] + k] + q * m->vertex[3 * (size_t)c[2] + k];
+}
+
+/* Has the direct light computed where ray i of a batch met something, at y. */
+static void put_close(struct gather_worker *w, const struct ray_batch *b, uint32_t i, size_t place,
+                      const double y[3], double *sum)
+{
+	struct gather_close *to = &w->close[w->closes];
+
+	to->place = place;
+	to->turn = w->closes++;
 	to->sum = sum;
 	to->w[0] = (double)b->w[0][i];
 	to->w[1] = (double)b->w[1][i];
-	to->place = place;
-	for (size_t k = 0; k < 3; k++)
-		to->x[k] = (1 - to->w[0] - to->w[1]) * m->vertex[3 * (size_t)c[0] + k] +
-		           to->w[0] * m->vertex[3 * (size_t)c[1] + k] +
-		           to->w[1] * m->vertex[3 * (size_t)c[2] + k];
-	v3_sub(to->x, x, d);
-	if (v3_dot(d, d) > CLOSE * CLOSE * m->element_area[place / 2])
-		return 0;
-	w->closes++;
-	return 1;
+	memcpy(to->x, y, sizeof to->x);
 }
 
 /* Adds the radiance of a point with its direct light computed. */
@@ -340,6 +339,46 @@ static void add_closes(struct gather_worker *w)
 	w->closes = 0;
 }
 
+/* Adds what errs in the radiance of what ray i of a batch met, at a distance d of x. */
+static void add_blur(struct gather_worker *w, const double d[3], uint32_t place, int computed)
+{
+	const struct view_scene *v = w->t->v;
+	const struct model *m = v->m;
+	size_t bands = (size_t)m->bands, e = place / 2;
+	const struct view_side *s = &v->side[2 * model_patch_material(m, m->element_patch[e]) + place % 2];
+	double square = v3_dot(d, d);
+	double part = fabs(v3_dot(d, w->normal) * v3_dot(d, &m->element_normal[3 * e])) * m->element_area[e] /
+	              (pi * square * square);
+
+	for (size_t k = 0; k < bands; k++)
+		w->blur[k] +=
+			s->here[k] * s->here[k] * view_blurred(v, place * bands + k, part, computed) +
+			s->across[k] * s->across[k] * view_blurred(v, (place ^ 1) * bands + k, part, computed);
+}
+
+/* Follows ray i of a batch beyond what it met. */
+static void go_on(struct gather_worker *w, const double x[3], const struct ray_batch *b, uint32_t i,
+                  uint32_t place, const struct gather_going *begun, double *sum)
+{
+	const struct gather_table *t = w->t;
+	int tail = t->kind[place] & GATHER_TAIL, close = t->kind[place] & GATHER_ROUGH && !tail;
+	double y[3], d[3];
+
+	if (close || i % ERRORS == 0) {
+		hit_point(t->v->m, b->triangle[i], (double)b->w[0][i], (double)b->w[1][i], y);
+		v3_sub(y, x, d);
+		close = close && v3_dot(d, d) < CLOSE * CLOSE * t->v->m->element_area[place / 2];
+	}
+	if (i % ERRORS == 0)
+		add_blur(w, d, place, close);
+	if (tail)
+		gather_go_on(w->tails, t, b, i, place, begun);
+	if (close)
+		put_close(w, b, i, place, y, sum);
+	else
+		gather_add(t, b, i, place, begun->weight, sum);
+}
+
 /* Adds the radiance that the rays of a batch find. */
 static void add_batch(struct gather_worker *w, const double x[3], struct ray_batch *b, uint32_t n,
                       uint64_t seed, double *sum)
@@ -357,15 +396,11 @@ static void add_batch(struct gather_worker *w, const double x[3], struct ray_bat
 	gather_places(t, b, n, place);
 	w->rays += n;
 	for (uint32_t i = 0; i < n; i++) {
+		w->blurs += i % ERRORS == 0;
 		if (b->triangle[i] == RAY_MISS)
 			continue;
-		if (t->kind[place[i]] & GATHER_TAIL) {
-			begun.random = rng_seed(seed, i);
-			gather_go_on(w->tails, t, b, i, place[i], &begun);
-		} else if (t->kind[place[i]] & GATHER_ROUGH && put_close(w, x, b, i, place[i], sum)) {
-			continue;
-		}
-		gather_add(t, b, i, place[i], begun.weight, sum);
+		begun.random = rng_seed(seed, i);
+		go_on(w, x, b, i, place[i], &begun, sum);
 	}
 	gather_follow(w->tails, t, RAY_BATCH - 1, sum);
 }
@@ -415,18 +450,21 @@ static int settled(double part[PARTS][BANDS_MAX], int bands, double rays, double
 }
 
 void gather_point(struct gather_worker *w, const double x[3], const double n[3], uint64_t seed,
-                  int rays, double relative, const double *scale, double *h, double *error)
+                  int rays, double relative, const double *scale, struct gathered *to)
 {
 	double part[PARTS][BANDS_MAX] = { { 0 } }, frame[3][3];
 	int bands = w->t->v->m->bands;
 	uint32_t each = relative > 0 ? FIRST : (uint32_t)(rays + PARTS - 1) / PARTS;
 
+	memset(w->blur, 0, sizeof w->blur);
+	w->blurs = 0;
+	memcpy(w->normal, n, sizeof w->normal);
 	v3_frame(n, frame[0], frame[1]);
 	memcpy(frame[2], n, sizeof frame[2]);
 	for (uint32_t p = 0; p < PARTS; p++)
 		add_rays(w, x, frame, seed, p * each, each, part[p]);
 	add_closes(w);
-	while (!settled(part, bands, each, relative, scale, h, error) && relative > 0 && each < MOST) {
+	while (!settled(part, bands, each, relative, scale, to->h, to->error) && relative > 0 && each < MOST) {
 		/* As many again: the parts so far are half as many, twice as long. */
 		each *= 2;
 		for (int b = 0; b < bands; b++) {
@@ -438,4 +476,6 @@ void gather_point(struct gather_worker *w, const double x[3], const double n[3],
 			add_rays(w, x, frame, seed, p * each, each, part[p]);
 		add_closes(w);
 	}
+	for (int b = 0; b < bands; b++)
+		to->common[b] = pi * sqrt(w->blur[b] / w->blurs);
 }

@@ -2,6 +2,7 @@
 #ifndef TWOPASS_GATHER_RAYS_H
 #define TWOPASS_GATHER_RAYS_H
 
+#include "gather.h"
 #include "gather_tail.h"
 #include "locate.h"
 #include "view_path.h"
@@ -38,6 +39,9 @@ struct gather_worker {
 	struct gather_tails *tails;
 	struct gather_close close[GATHER_CLOSES];
 	uint32_t closes;
+	double normal[3];           /* of the point in work */
+	double blur[BANDS_MAX];     /* variance of the radiance that the solution has found wrong, */
+	double blurs;               /* summed over so many rays */
 	struct direct_worker *direct;
 	struct err e;
 	uint64_t rays;
@@ -64,6 +68,6 @@ void gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_
  * pi times the mean radiance of `rays` rays by the cosine; with relative > 0 as many as it
  * takes for a standard error of that times scale[bands]. */
 void gather_point(struct gather_worker *w, const double x[3], const double n[3], uint64_t seed,
-                  int rays, double relative, const double *scale, double *h, double *error);
+                  int rays, double relative, const double *scale, struct gathered *to);
 
 #endif

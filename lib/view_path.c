@@ -125,8 +125,8 @@ static void add_error(struct view_walker *w, const struct view_branch *b, const 
 	double part = b->density * w->v->m->element_area[p->element] * p->cosine / (way * way);
 	for (size_t i = 0; i < bands; i++)
 		w->blurred[i] += b->weight[i] * b->weight[i] *
-		                 (s->here[i] * s->here[i] * view_blurred(w->v, at + i, part) +
-		                  s->across[i] * s->across[i] * view_blurred(w->v, far + i, part));
+		                 (s->here[i] * s->here[i] * view_blurred(w->v, at + i, part, 0) +
+		                  s->across[i] * s->across[i] * view_blurred(w->v, far + i, part, 0));
 }
 
 /* Adds what the point itself sends: emission and M / pi. */

@@ -42,10 +42,10 @@ struct view_scene {
 };
 
 /* What channel `at`, of [2 elements][bands], adds to the variance of the irradiance seen by
- * way of something that blurs it, of which its element fills this part. Elements err apart
- * from one another; but an interpolated value errs with the elements around, which pays
- * only where the part is small. */
-double view_blurred(const struct view_scene *v, size_t at, double part);
+ * way of something that blurs it, of which its element fills this part; with its direct light
+ * computed or not. Elements err apart from one another; but an interpolated value errs with
+ * the elements around, which pays only where the part is small. */
+double view_blurred(const struct view_scene *v, size_t at, double part, int computed);
 
 /* Up to how many directional events from the eye light is computed rather than
  * interpolated; behind a lobe that is sampled it is always interpolated. */

@@ -103,12 +103,20 @@ static const unsigned interpolated[] = { PART_ALL, PART_CAUSTIC | PART_INDIRECT,
  * noise and of discretisation: fits to several elements take part of both out. Measured. */
 static const double noise_left = .22, discretisation_left = .6;
 
-double view_blurred(const struct view_scene *v, size_t at, double part)
+/* What is left of an error without that of a part. */
+static double without(const double *all, const double *part, size_t at)
 {
-	double noise = v->s->error ? v->s->error[at] : 0;
-	double missed = v->s->discretisation ? discretisation_left * v->s->discretisation[at] : 0;
+	return all ? all[at] * all[at] - (part ? fmin(part[at], all[at]) * fmin(part[at], all[at]) : 0) : 0;
+}
 
-	return fmin(noise_left * noise_left, part) * noise * noise + fmin(1, part) * missed * missed;
+double view_blurred(const struct view_scene *v, size_t at, double part, int computed)
+{
+	const struct solution *s = v->s;
+	double noise = without(s->error, computed ? s->error_direct : NULL, at);
+	double missed = without(s->discretisation, computed ? s->discretisation_direct : NULL, at);
+
+	return fmin(noise_left * noise_left, part) * noise +
+	       fmin(1, part) * discretisation_left * discretisation_left * missed;
 }
 
 /* Group 0 of a solution with the parts that are interpolated alone, in arrays of its own. */

@@ -85,11 +85,13 @@ static void shade(struct view_shader *s, size_t request, int side, const struct 
 	}
 	if (!s->gather)
 		return;
-	gather_at(s->gather, 2 * q->element + (uint32_t)side, q->x, q->w, q->seed, s->thread, h, error);
+	struct gathered found;
+	gather_at(s->gather, 2 * q->element + (uint32_t)side, q->x, q->w, q->seed, s->thread, &found);
 	for (size_t b = 0; b < bands; b++) {
-		double off = weight[b] * part[b] * error[b];
-		light[b] += weight[b] * part[b] * h[b];
+		double off = weight[b] * part[b] * found.error[b];
+		light[b] += weight[b] * part[b] * found.h[b];
 		square[b] += off * off;
+		to->error[q->slot * bands + b] += weight[b] * part[b] * found.common[b];
 	}
 }
 
