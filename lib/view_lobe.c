@@ -12,7 +12,8 @@ static const double pi = 3.14159265358979323846;
 
 enum {
 	PARTS = 4,             /* of the samples, that a standard error comes from */
-	FIRST = 4, MOST = 64   /* samples of a part where an error is aimed at */
+	FIRST = 4, MOST = 64,  /* samples of a part where an error is aimed at */
+	PROBES = 8             /* of each of two parts that tell how far one ray is off */
 };
 
 /* Standard error of a stretch of the sequence over that of as many independent parts: the
@@ -79,6 +80,22 @@ struct run {
 	struct part part[PARTS];
 };
 
+/* Follows the next branch to its end. */
+static void follow(struct run *r, double scale, struct part *to)
+{
+	struct view_walker *w = r->w;
+	size_t below = w->waiting;
+
+	memset(w->directional, 0, sizeof w->directional);
+	memset(w->lit, 0, sizeof w->lit);
+	view_push(w, r->b, r->next, r->coefficient, scale);
+	view_run(w, below);
+	for (int b = 0; b < w->v->m->bands; b++) {
+		to->rest[b] += w->directional[b];
+		to->lit[b] += w->lit[b];
+	}
+}
+
 /* Follows sample i to its end and adds it to a part; without one, has it wait. */
 static void follow_sample(struct run *r, uint32_t i, struct part *to)
 {
@@ -86,7 +103,6 @@ static void follow_sample(struct run *r, uint32_t i, struct part *to)
 	enum lobe_kind kind = r->w->v->m->lobe;
 	struct view_walker *w = r->w;
 	struct view_branch *next = r->next;
-	int bands = w->v->m->bands;
 
 	next->index = r->first + i;
 	double u[2] = { rng_sobol(next->index, 0, next->seed), rng_sobol(next->index, 1, next->seed) };
@@ -97,20 +113,11 @@ static void follow_sample(struct run *r, uint32_t i, struct part *to)
 	double cos_i = v3_dot(l->normal, next->dir);
 	if (!(cos_i > 0))
 		return;
-	if (!to) {
-		view_push(w, r->b, next, r->coefficient, per_density(l, kind, cos_i));
-		return;
-	}
-	size_t below = w->waiting;
 	next->density = density(l, kind, next->dir);
-	memset(w->directional, 0, sizeof w->directional);
-	memset(w->lit, 0, sizeof w->lit);
-	view_push(w, r->b, next, r->coefficient, per_density(l, kind, cos_i));
-	view_run(w, below);
-	for (int b = 0; b < bands; b++) {
-		to->rest[b] += w->directional[b];
-		to->lit[b] += w->lit[b];
-	}
+	if (to)
+		follow(r, per_density(l, kind, cos_i), to);
+	else
+		view_push(w, r->b, next, r->coefficient, per_density(l, kind, cos_i));
 }
 
 /* Mean and variance of n samples in `parts` parts, with emitters or without. */
@@ -232,4 +239,32 @@ void view_lobe_follow(struct view_walker *w, const struct view_branch *b,
 		w->error[k] += sqrt(w->blurred[k] / n);
 	}
 	put_light(&r, parts, n, lit);
+}
+
+void view_lobe_probe(struct view_walker *w, const struct view_branch *b,
+                     const struct view_lobe_seen *l, const double *coefficient, double scale,
+                     const struct view_branch *axial)
+{
+	struct view_branch next = *axial;
+	struct run r = { .w = w, .b = b, .l = l, .coefficient = coefficient, .next = &next,
+	                 .first = 2 * PROBES * b->index };
+	struct part one = { { 0 }, { 0 } };
+	double directional[BANDS_MAX], cut[BANDS_MAX];
+
+	memcpy(directional, w->directional, sizeof directional);
+	memcpy(cut, w->cut, sizeof cut);
+	next.lobes = next.straight = 1;
+	next.density = density(l, w->v->m->lobe, l->axis);
+	follow(&r, scale, &one);
+	for (uint32_t i = 0; i < 2 * PROBES; i++)
+		follow_sample(&r, i, &r.part[i / PROBES]);
+	for (int k = 0; k < w->v->m->bands; k++) {
+		double off[2], weight = b->weight[k] * coefficient[k];
+		for (int p = 0; p < 2; p++)
+			off[p] = one.rest[k] + one.lit[k] - (r.part[p].rest[k] + r.part[p].lit[k]) / PROBES;
+		w->probed[k] += weight * weight;
+		w->off[k] += off[0] * off[1];
+	}
+	memcpy(w->directional, directional, sizeof directional);
+	memcpy(w->cut, cut, sizeof cut);
 }

@@ -22,6 +22,12 @@ void view_lobe_follow(struct view_walker *w, const struct view_branch *b,
                       const struct view_lobe_seen *l, const double *coefficient,
                       struct view_branch *next);
 
+/* Compares what samples find, and one ray about the axis that carries `scale` times the
+ * coefficient: adds to the walker's `probed` and `off`, without bias, and to nothing else. */
+void view_lobe_probe(struct view_walker *w, const struct view_branch *b,
+                     const struct view_lobe_seen *l, const double *coefficient, double scale,
+                     const struct view_branch *axial);
+
 /* The lobe as a weight of directions, for unit coefficient: f cos theta_i. l must outlive
  * it. */
 struct view_lobe_weight {

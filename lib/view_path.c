@@ -192,24 +192,31 @@ void view_push(struct view_walker *w, const struct view_branch *b, struct view_b
 			w->cut[i] += next->weight[i] * w->v->ceiling[i];
 }
 
-/* Samples a finite lobe. */
+/* Follows a finite lobe, by samples or by one ray about its axis. */
 static void branch_into(struct view_walker *w, const struct view_branch *b, const struct point *p,
                         const struct view_lobe *lobe, int side, struct view_branch *next)
 {
 	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
 	struct view_lobe_seen l = { .k = lobe->k, .cosine = fmax(p->cosine, 1e-14),
 	                            .element = p->element, .side = side, .table = &lobe->table };
+	double scale = w->v->m->lobe == LOBE_RECIPROCAL ? lobe_albedo(lobe->k, p->cosine) : 1;
 
-	if (w->asking)
-		return;
 	memcpy(l.axis, next->dir, sizeof l.axis);
 	memcpy(l.x, p->x, sizeof l.x);
 	for (int k = 0; k < 3; k++)
 		l.normal[k] = side == FRONT ? p->n[k] : -p->n[k];
-	reconstruction_at(&w->v->all, p->element, p->side, p->w, l.other);
+	if (w->o->lobe_samples || b->lobes) {
+		reconstruction_at(&w->v->all, p->element, p->side, p->w, l.other);
+		for (int i = 0; i < w->v->m->bands; i++)
+			l.other[i] = b->weight[i] * s->here[i] * l.other[i] + w->directional[i];
+		view_lobe_follow(w, b, &l, lobe->coefficient, next);
+		return;
+	}
 	for (int i = 0; i < w->v->m->bands; i++)
-		l.other[i] = b->weight[i] * s->here[i] * l.other[i] + w->directional[i];
-	view_lobe_follow(w, b, &l, lobe->coefficient, next);
+		w->axial[i] += b->weight[i] * b->weight[i] * lobe->coefficient[i] * lobe->coefficient[i];
+	if (w->probing)
+		view_lobe_probe(w, b, &l, lobe->coefficient, scale, next);
+	view_push(w, b, next, lobe->coefficient, scale);
 }
 
 /* Follows one directional part of a point: `through` 0 for reflection into the side
@@ -220,7 +227,6 @@ static void branch_off(struct view_walker *w, const struct view_branch *b,
 	struct view_branch next = { .lobes = b->lobes, .density = b->density, .share = b->share,
 	                            .index = b->index, .reach = b->lobes ? b->reach + p->way : 0 };
 	int side = through ? !p->side : p->side, ideal = isinf(lobe->k);
-	double scale = 1;
 
 	if (through)
 		memcpy(next.dir, b->dir, sizeof next.dir);
@@ -229,13 +235,10 @@ static void branch_off(struct view_walker *w, const struct view_branch *b,
 	leave(w->v, p, side, next.org);
 	next.passes = through && ideal && b->passes;
 	next.seed = rng_mix(b->seed + 1 + (uint64_t)through);
-	if (!ideal && w->o->lobe_samples) {
+	if (ideal)
+		view_push(w, b, &next, lobe->coefficient, 1);
+	else if (!w->asking || !w->o->lobe_samples)
 		branch_into(w, b, p, lobe, side, &next);
-		return;
-	}
-	if (!ideal && w->v->m->lobe == LOBE_RECIPROCAL)
-		scale = lobe_albedo(lobe->k, p->cosine);
-	view_push(w, b, &next, lobe->coefficient, scale);
 }
 
 static void follow_branch(struct view_walker *w, const struct view_branch *b)

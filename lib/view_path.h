@@ -88,6 +88,10 @@ struct view_walker {
 	double error[BANDS_MAX];    /* of interpolated light */
 	double blurred[BANDS_MAX];  /* squares of it, that the samples of a lobe have summed up */
 	double cut[BANDS_MAX];
+	/* Lobes seen by one ray about their axis: squares of what it counts with, and of lobes
+	 * that are probed that too, and squares of how far the ray is off. */
+	double axial[BANDS_MAX], probed[BANDS_MAX], off[BANDS_MAX];
+	int probing;                /* lobes are probed */
 	uint64_t rays;
 };
 

@@ -59,6 +59,7 @@ struct view_sums {
 	double *error;              /* of interpolated light: alike in all samples of a pixel */
 	double *square;             /* of standard errors of sampled light, independent */
 	double *spread;             /* sum of squared radiances */
+	double *axial;              /* sum of squared weights of lobes seen by one ray */
 };
 
 /* Shades the points collected since the last call and forgets them. */
