@@ -27,10 +27,11 @@ static double carries(const struct view_lobe *lobe, const struct gather_going *g
 }
 
 /* Chooses a way by what it carries. 0 if the ray ends. */
-static int choose(const struct view_side *s, int bands, int side, struct gather_going *g, struct way *way)
+static int choose(const struct view_side *s, int bands, int side, struct gather_going *g,
+                  struct way *way)
 {
-	double reflected = carries(&s->reflected, g, bands), all = reflected + carries(&s->transmitted, g, bands);
-	double most = 0;
+	double reflected = carries(&s->reflected, g, bands);
+	double all = reflected + carries(&s->transmitted, g, bands), most = 0;
 
 	if (!(all > 0))
 		return 0;

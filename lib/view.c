@@ -277,8 +277,9 @@ static int done(const struct render *r, const struct view_sums *sums, size_t pix
 
 /* Stores a pixel of the sums over n samples as pixel (i, j) and adds it to the tile's. w: what
  * the tile's probes of lobes have found. */
-static void store_pixel(const struct render *r, const struct view_walker *w, const struct view_sums *from,
-                        size_t pixel, double n, int i, int j, struct tile_sum *sum)
+static void store_pixel(const struct render *r, const struct view_walker *w,
+                        const struct view_sums *from, size_t pixel, double n, int i, int j,
+                        struct tile_sum *sum)
 {
 	size_t id = (size_t)j * (size_t)r->f->width + (size_t)i, bands = (size_t)r->v->m->bands;
 	double *diffuse = from->diffuse + pixel * bands;
