@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "direct.h"
+#include "light_way.h"
 #include "lobe_table.h"
 #include "reconstruct.h"
 #include "view.h"
@@ -38,6 +39,7 @@ struct view_scene {
 	int lobes;                  /* there are finite lobes */
 	int tails;                  /* something reflects or transmits directionally */
 	int highlights;             /* there are punctual lights, and finite lobes */
+	struct light_ways ways;     /* of them, if so */
 	double ceiling[BANDS_MAX];  /* no radiance along an unsampled tail exceeds it */
 };
 
