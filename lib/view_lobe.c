@@ -12,7 +12,8 @@ static const double pi = 3.14159265358979323846;
 
 enum {
 	PARTS = 4,             /* of the samples, that a standard error comes from */
-	FIRST = 4, MOST = 64,  /* samples of a part where an error is aimed at */
+	FIRST = 4, MOST = 64,  /* samples of a part where an error is aimed at; fewer at first */
+	FEWEST = 2,            /* where a pixel has several places */
 	PROBES = 8             /* of each of two parts that tell how far one ray is off */
 };
 
@@ -194,10 +195,10 @@ static int settled(const struct run *r, double n)
 /* As many samples as it takes: returns their number. */
 static uint32_t follow_until(struct run *r)
 {
-	uint32_t each = FIRST;
+	uint32_t each = r->w->o->samples >= FIRST / FEWEST ? FEWEST : FIRST;
 
-	for (uint32_t i = 0; i < PARTS * FIRST; i++)
-		follow_both(r, i, &r->part[i / FIRST]);
+	for (uint32_t i = 0; i < PARTS * each; i++)
+		follow_both(r, i, &r->part[i / each]);
 	while (!settled(r, PARTS * each) && each < MOST) {
 		/* As many again: the parts so far are half as many, twice as long. */
 		each *= 2;
