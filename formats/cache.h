@@ -14,7 +14,7 @@
 #define REVISION_MESH "6"
 #define REVISION_FF "10"
 #define REVISION_RAD "10"
-#define REVISION_VIEW "6"
+#define REVISION_VIEW "7"
 
 /* Strings are owned (malloc) and may be NULL. */
 struct cache_info {

@@ -13,12 +13,16 @@
 enum {
 	TILE = 16,
 	ROUND = 4,  /* samples of a pixel that are followed before it is looked at again */
-	SUMS = 6    /* arrays of view_sums */
+	SUMS = 7,   /* arrays of view_sums */
+	PROBE = 4   /* of so many pixels squared one has its lobes probed */
 };
 
 /* That shadow rays aim at, relative to the direct light of a pixel, where no error is asked
  * for. */
 static const double usual_error = .1;
+
+/* The same of samples of a lobe. */
+static const double usual_lobe_error = .05;
 
 /* Variance of the mean of n samples that are stratified over a pixel over that of samples
  * which are not, divided by sqrt(n). Measured at edges, with 2 to 16 samples. */
@@ -190,6 +194,8 @@ static void follow_sample(const struct render *r, struct view_walker *w, int i, 
 	memset(w->directional, 0, bands * sizeof *w->directional);
 	memset(w->emission, 0, bands * sizeof *w->emission);
 	memset(w->error, 0, bands * sizeof *w->error);
+	memset(w->axial, 0, bands * sizeof *w->axial);
+	w->probing = s == 0 && i % PROBE == PROBE / 2 && j % PROBE == PROBE / 2;
 	camera_ray(r->f, i + r->spot[s][0], j + r->spot[s][1], b.org, b.dir);
 	view_follow(w, &b);
 }
@@ -202,7 +208,14 @@ static void keep_sample(const struct view_walker *w, size_t bands, const struct 
 	memcpy(to->directional + at, w->directional, size);
 	memcpy(to->emission + at, w->emission, size);
 	memcpy(to->error + at, w->error, size);
+	memcpy(to->axial + at, w->axial, size);
 	memset(to->square + at, 0, size);
+}
+
+/* Is there light that is computed, rather than interpolated? */
+static int shades(const struct render *r)
+{
+	return r->v->method != VIEW_MESH || (r->v->lobes && r->o->lobe_samples);
 }
 
 /* Tells what light is needed for a tile. */
@@ -212,7 +225,8 @@ static void ask_tiles(void *arg, size_t begin, size_t end, int thread)
 	struct worker *k = &r->worker[thread];
 
 	for (size_t t = begin; t < end; t++) {
-		struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack, .shader = &k->shader };
+		struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack, .shader = &k->shader,
+			                 .asking = 1 };
 		struct tile tile = tile_at(r, t);
 		for (int p = 0; p < tile.pixels; p++)
 			for (int s = 0; s < r->o->samples; s++)
@@ -233,6 +247,7 @@ static void add_round(const struct view_sums *from, size_t pixel, int samples, s
 			to->emission[sum] += from->emission[at];
 			to->error[sum] += from->error[at];
 			to->square[sum] += from->square[at];
+			to->axial[sum] += from->axial[at];
 			to->spread[sum] += total * total;
 		}
 }
@@ -260,9 +275,11 @@ static int done(const struct render *r, const struct view_sums *sums, size_t pix
 	return r->o->relative > 0;
 }
 
-/* Stores a pixel of the sums over n samples as pixel (i, j) and adds it to the tile's. */
-static void store_pixel(const struct render *r, const struct view_sums *from, size_t pixel, double n,
-                        int i, int j, struct tile_sum *sum)
+/* Stores a pixel of the sums over n samples as pixel (i, j) and adds it to the tile's. w: what
+ * the tile's probes of lobes have found. */
+static void store_pixel(const struct render *r, const struct view_walker *w,
+                        const struct view_sums *from, size_t pixel, double n, int i, int j,
+                        struct tile_sum *sum)
 {
 	size_t id = (size_t)j * (size_t)r->f->width + (size_t)i, bands = (size_t)r->v->m->bands;
 	double *diffuse = from->diffuse + pixel * bands;
@@ -273,6 +290,8 @@ static void store_pixel(const struct render *r, const struct view_sums *from, si
 	for (size_t k = 0; k < bands; k++) {
 		double linear = from->error[pixel * bands + k] / n;
 		double variance = linear * linear + sampling_variance(from, pixel * bands + k, n);
+		if (w->probed[k] > 0)
+			variance += from->axial[pixel * bands + k] / n * fmax(0, w->off[k] / w->probed[k]);
 		diffuse[k] /= n;
 		directional[k] /= n;
 		emission[k] /= n;
@@ -324,7 +343,7 @@ static void trace_round(const struct render *r, struct worker *k, const struct t
 static void trace_tile(const struct render *r, struct worker *k, size_t t)
 {
 	struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack,
-		                 .shader = r->v->method == VIEW_MESH ? NULL : &k->shader };
+		                 .shader = shades(r) ? &k->shader : NULL };
 	struct tile tile = tile_at(r, t);
 	struct tile_sum *sum = &r->tile[t];
 
@@ -335,7 +354,7 @@ static void trace_tile(const struct render *r, struct worker *k, size_t t)
 		trace_round(r, k, &tile, &w, from, to);
 	}
 	for (int p = 0; p < tile.pixels; p++)
-		store_pixel(r, &k->sums, (size_t)p, abs(k->samples[p]), tile.x + p % tile.wide,
+		store_pixel(r, &w, &k->sums, (size_t)p, abs(k->samples[p]), tile.x + p % tile.wide,
 		            tile.y + p / tile.wide, sum);
 	for (int b = 0; b < r->v->m->bands; b++)
 		sum->cut += w.cut[b] / r->o->samples;
@@ -363,7 +382,7 @@ static double radical_inverse(uint32_t i)
 static int new_sums(struct view_sums *s, size_t values, struct err *e)
 {
 	double **array[SUMS] = { &s->diffuse, &s->directional, &s->emission, &s->error, &s->square,
-		                 &s->spread };
+		                 &s->spread, &s->axial };
 	double *room = mem_new(SUMS * values, sizeof *room, "pixels", e);
 
 	for (int i = 0; i < SUMS; i++)
@@ -378,11 +397,12 @@ static int new_worker(const struct render *r, struct worker *k, int thread, stru
 	k->stack = mem_new(view_stack_size(r->o), sizeof *k->stack, "ray stacks", e);
 	if (!k->stack || new_sums(&k->slots, ROUND * values, e) || new_sums(&k->sums, values, e))
 		return -1;
-	if (r->v->method == VIEW_MESH)
+	if (!shades(r))
 		return 0;
-	double relative = r->o->relative > 0 ? r->o->relative / 2
-	                                     : fmin(1, usual_error * sqrt(r->o->samples));
-	return view_shader_init(&k->shader, r->v, r->gather, relative, thread, e);
+	double relative = r->o->relative / 2, usual = sqrt(r->o->samples);
+	return view_shader_init(&k->shader, r->v, r->gather,
+	                        relative > 0 ? relative : fmin(1, usual_error * usual),
+	                        relative > 0 ? relative : fmin(1, usual_lobe_error * usual), thread, e);
 }
 
 static void free_workers(struct render *r)

@@ -40,7 +40,7 @@ static const struct cli_option option_table[] = {
 	{ OPT_BUDGET, "budget", "SECONDS", "as many samples and rays as fit in, for each picture" },
 	{ OPT_SAMPLES, "samples", "N", "positions in each pixel (default: 4; 1: its centre)" },
 	{ OPT_LOBE_SAMPLES, "lobe-samples", "N",
-	  "rays into a finite lobe (default: 0: one, about its axis)" },
+	  "samples of a finite lobe (default: by their noise; 0: one ray about its axis)" },
 	{ OPT_GATHER_RAYS, "gather-rays", "N", "rays that -d gather takes at a point (default: 1024)" },
 	{ OPT_DEPTH, "depth", "N", "directional events that are followed (default: 32)" },
 	{ OPT_CUTOFF, "cutoff", "X", "cut tails that carry less than this part (default: 0.001)" },
@@ -477,10 +477,10 @@ int main(int argc, char **argv)
 {
 	struct trace t = {
 		.cli = { .program = "trace", .synopsis = "[options] FILE.rad -o PICTURE.exr",
-		         .about = "Render views of a solved scene, following mirrors and panes.",
+		         .about = "Render views of a solved scene, following mirrors, panes and lobes.",
 		         .options = option_table, .uses_threads = 1 },
 		.method = VIEW_DIRECT,
-		.view = { .depth = 32, .cutoff = 1e-3 }
+		.view = { .depth = 32, .cutoff = 1e-3, .lobe_samples = VIEW_LOBE_ENOUGH }
 	};
 	struct err e = { 0 };
 	int status = 0;

@@ -8,6 +8,7 @@
 
 #include "grid.h"
 
+#include "../../lib/bsdf.h"
 #include "../../lib/lobe.h"
 #include "../../lib/view.h"
 #include "../../lib/vec3.h"
@@ -335,6 +336,104 @@ static void test_lobes(void **state)
 	}
 }
 
+/* A glossy floor at z = 0 of exponent k below a surface of n x n cells at z = 1: a lamp of
+ * radiance `lamp`, or whose elements have some irradiance each. */
+static void gloss(struct stage *t, enum lobe_kind kind, double k, size_t n, double lamp)
+{
+	double o[3] = { -3, -3, 0 }, x[3] = { 6, 0, 0 }, y[3] = { 0, 6, 0 };
+	double size = lamp > 0 ? 1 : 8, up[3] = { -size / 2, -size / 2, 1 };
+	double px[3] = { 0, size, 0 }, py[3] = { size, 0, 0 };
+
+	*t = (struct stage){ 0 };
+	grid_new(&t->m, 2, n, 2, 1);
+	t->m.lobe = kind;
+	set(&t->m, 0, FRONT, 0, 0, .6, 0, k);
+	set(&t->m, 1, FRONT, lamp > 0 ? 0 : 1, 0, 0, 0, 1);
+	memset(t->m.material.emission, 0, 4 * sizeof *t->m.material.emission);
+	t->m.material.emission[2] = lamp;
+	grid_quad(&t->m, n, 0, o, x, y);
+	grid_quad(&t->m, n, 1, up, px, py);
+	stage_end(t, 0);
+	for (size_t e = 2 * n * n; e < t->m.elements && lamp == 0; e++)
+		t->s.indirect[2 * e] = (double)(e * 2654435761u % 97) / 97;
+	use_method(t, VIEW_MESH);
+}
+
+/* What a lobe shows of a lamp, by quadrature over the lamp. */
+static void test_lamp_in_lobe(void **state)
+{
+	double eye[3] = { .7, -.4, .8 }, at[3] = { .1, .05, 0 }, out[3];
+	(void)state;
+
+	v3_sub(eye, at, out);
+	v3_normalise(out);
+	for (int kind = 0; kind < 2; kind++)
+		for (double k = 0; k < 2e4; k = 3 * k + 2) {
+			struct stage t;
+			struct view_options o = options();
+			double sum = 0, f;
+			int n = 800;
+			gloss(&t, kind ? LOBE_RECIPROCAL : LOBE_PAPER, k, 1, 7);
+			o.lobe_samples = VIEW_LOBE_ENOUGH;
+			double seen = look(&t, &o, eye[0], eye[1], eye[2], at[0], at[1], at[2]);
+			for (int i = 0; i < n; i++)
+				for (int j = 0; j < n; j++) {
+					double d[3] = { (i + .5) / n - .5 - at[0], (j + .5) / n - .5 - at[1], 1 };
+					double square = v3_dot(d, d), up[3] = { 0, 0, 1 };
+					v3_normalise(d);
+					bsdf_eval_lobes(&t.m, 0, up, d, out, &f);
+					sum += 7 * f * d[2] * d[2] / square / (n * n);
+				}
+			assert_true(fabs(seen - sum) < 2e-3 * sum + 1e-6);
+			stage_free(&t);
+		}
+}
+
+/* Squares of standard errors, of what they are of, and of radiance, over a picture of a lobe. */
+static void compare(const struct stage *t, int lobe_samples, double *stated, double *true_error,
+                    double *all)
+{
+	struct view_frame f = frame(.5, -.6, .7, .1, .1, 0, 16, 16);
+	struct view_options o = options();
+	struct image a, b;
+
+	*stated = *true_error = *all = 0;
+	o.layers = VIEW_ERROR;
+	o.lobe_samples = lobe_samples;
+	render(t, &f, &o, &a);
+	o.lobe_samples = 1024;
+	render(t, &f, &o, &b);
+	const float *error = image_plane(&a, image_channel(&a, "error.R"));
+	for (size_t i = 0; i < 16 * 16; i++) {
+		double off = (double)a.pixel[i] - (double)b.pixel[i];
+		*stated += (double)error[i] * (double)error[i];
+		*true_error += off * off;
+		*all += (double)b.pixel[i] * (double)b.pixel[i];
+	}
+	image_free(&a);
+	image_free(&b);
+}
+
+static void test_lobe_errors(void **state)
+{
+	static const int samples[] = { 0, 4, 16, 64, VIEW_LOBE_ENOUGH };
+	double stated, off, all;
+	(void)state;
+
+	for (double k = 3; k < 500; k *= 8)
+		for (int i = 0; i < 5; i++) {
+			struct stage t;
+			gloss(&t, LOBE_PAPER, k, 40, 0);
+			compare(&t, samples[i], &stated, &off, &all);
+			printf("# exponent %g, %d samples: stated %.3g of the true error\n", k, samples[i],
+			       sqrt(stated / off));
+			assert_true(stated > .25 * off);
+			/* More than that, where there are many samples for how smooth light is. */
+			assert_true(stated < 4 * off || stated < 2.5e-3 * all);
+			stage_free(&t);
+		}
+}
+
 /* Camera rays and their straight-through continuations pass black backs, mirrored
  * rays do not. */
 static void test_one_sided(void **state)
@@ -409,7 +508,8 @@ int main(void)
 		cmocka_unit_test(test_furnace), cmocka_unit_test(test_cut_bound),
 		cmocka_unit_test(test_layers), cmocka_unit_test(test_layer_names),
 		cmocka_unit_test(test_threads), cmocka_unit_test(test_sides),
-		cmocka_unit_test(test_lobes), cmocka_unit_test(test_one_sided),
+		cmocka_unit_test(test_lobes), cmocka_unit_test(test_lamp_in_lobe),
+		cmocka_unit_test(test_lobe_errors), cmocka_unit_test(test_one_sided),
 		cmocka_unit_test(test_background_and_bands)
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
