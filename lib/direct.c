@@ -199,6 +199,12 @@ void direct_begin(struct direct_worker *w, uint32_t element_side)
 
 /* ---- by formula ---- */
 
+/* cos^m; nearly every emitter has m = 1. */
+static double lobe(double cos_theta, double exponent)
+{
+	return exponent == 1 ? cos_theta : pow(cos_theta, exponent);
+}
+
 /* Angle between a unit vector and any other. */
 static double angle(const double unit[3], const double v[3])
 {
@@ -231,13 +237,13 @@ static double weighted_part(const struct emitter *t, const double x[3], const st
 	}
 	double at[4][ROOM];
 	struct cubature p = { 0, at[0], at[1], at[2], at[3] };
-	cubature_fill(f, 2, &p);
+	cubature_fill(f, 1, &p);
 	for (int i = 0; i < p.n; i++) {
 		double y[3] = { p.x[i], p.y[i], p.z[i] };
 		v3_sub(y, x, d);
 		double r = v3_normalise(d), there = -v3_dot(d, t->f.normal);
 		if (p.w[i] > 0 && there > 0)
-			sum += p.w[i] * pow(there, t->exponent) * weight->at(d, weight->arg) / (r * r);
+			sum += p.w[i] * lobe(there, t->exponent) * weight->at(d, weight->arg) / (r * r);
 	}
 	return sum;
 }
@@ -330,12 +336,6 @@ static double exact(struct direct_worker *w, const struct outlook *o, const doub
 }
 
 /* ---- by shadow rays ---- */
-
-/* cos^m; nearly every emitter has m = 1. */
-static double lobe(double cosine, double exponent)
-{
-	return exponent == 1 ? cosine : pow(cosine, exponent);
-}
 
 /* About what an emitter would bring if nothing were hidden: the density that it is chosen
  * with. 0 only if it is behind the plane of x, or x behind its plane. */

@@ -12,13 +12,17 @@ static const double pi = 3.14159265358979323846;
 
 enum {
 	PARTS = 4,             /* of the samples, that a standard error comes from */
-	FIRST = 4, MOST = 64,  /* samples of a part where an error is aimed at */
+	FIRST = 4, MOST = 64,  /* samples of a part where an error is aimed at; fewer at first */
+	FEWEST = 2,            /* where a pixel has several places */
 	PROBES = 8             /* of each of two parts that tell how far one ray is off */
 };
 
 /* Standard error of a stretch of the sequence over that of as many independent parts: the
  * parts fill one another's gaps. Measured. */
 static const double together = .8;
+
+/* Images of emitters are aimed at if they may bring such a part of the pixel's light. */
+static const double worth_aiming = .01;
 
 /* ---- the lobe as a weight ---- */
 
@@ -96,6 +100,25 @@ static void follow(struct run *r, double scale, struct part *to)
 	}
 }
 
+/* Aims at an image of an emitter, for sample i, and follows that. */
+static void follow_aimed(struct run *r, uint32_t i, struct part *to)
+{
+	const struct view_images *images = &r->w->v->images;
+	const struct view_lobe_weight weight = { r->l, r->w->v->m->lobe };
+	struct view_branch *next = r->next;
+	uint32_t image;
+	double u[3];
+
+	for (int k = 0; k < 3; k++)
+		u[k] = rng_sobol(r->first + i, 2 + k, next->seed);
+	double chance = view_aim_at(images, &r->w->aim, u, next->dir, &image);
+	if (!(chance > 0))
+		return;
+	next->aimed = 1 + image;
+	follow(r, weight_at(next->dir, &weight) / (chance + density(r->l, weight.kind, next->dir)), to);
+	next->aimed = 0;
+}
+
 /* Follows sample i to its end and adds it to a part; without one, has it wait. */
 static void follow_sample(struct run *r, uint32_t i, struct part *to)
 {
@@ -118,6 +141,26 @@ static void follow_sample(struct run *r, uint32_t i, struct part *to)
 		follow(r, per_density(l, kind, cos_i), to);
 	else
 		view_push(w, r->b, next, r->coefficient, per_density(l, kind, cos_i));
+}
+
+static void follow_both(struct run *r, uint32_t i, struct part *to)
+{
+	follow_sample(r, i, to);
+	if (r->w->aim.sum > 0)
+		follow_aimed(r, i, to);
+}
+
+/* What is aimed at has to bring a part of the light of a pixel. */
+static void aim(struct view_walker *w, const struct view_branch *b, const struct view_lobe_seen *l,
+                const double *coefficient)
+{
+	double other = 0, most = 0;
+
+	for (int i = 0; i < w->v->m->bands; i++) {
+		other += l->other[i] / w->v->m->bands;
+		most = fmax(most, b->weight[i] * coefficient[i]);
+	}
+	view_aim_begin(&w->v->images, l, worth_aiming * other / most, &w->aim);
 }
 
 /* Mean and variance of n samples in `parts` parts, with emitters or without. */
@@ -152,10 +195,10 @@ static int settled(const struct run *r, double n)
 /* As many samples as it takes: returns their number. */
 static uint32_t follow_until(struct run *r)
 {
-	uint32_t each = FIRST;
+	uint32_t each = r->w->o->samples >= FIRST / FEWEST ? FEWEST : FIRST;
 
-	for (uint32_t i = 0; i < PARTS * FIRST; i++)
-		follow_sample(r, i, &r->part[i / FIRST]);
+	for (uint32_t i = 0; i < PARTS * each; i++)
+		follow_both(r, i, &r->part[i / each]);
 	while (!settled(r, PARTS * each) && each < MOST) {
 		/* As many again: the parts so far are half as many, twice as long. */
 		each *= 2;
@@ -169,7 +212,7 @@ static uint32_t follow_until(struct run *r)
 				*at[2] = *at[3] = 0;
 			}
 		for (uint32_t i = 2 * each; i < PARTS * each; i++)
-			follow_sample(r, i, &r->part[i / each]);
+			follow_both(r, i, &r->part[i / each]);
 	}
 	return PARTS * each;
 }
@@ -218,6 +261,8 @@ void view_lobe_follow(struct view_walker *w, const struct view_branch *b,
 	memset(w->cut, 0, sizeof w->cut);
 	memset(w->blurred, 0, sizeof w->blurred);
 	next->straight = 1;
+	next->turns = 0;
+	aim(w, b, l, coefficient);
 	uint32_t n = w->o->lobe_samples == VIEW_LOBE_ENOUGH ? PARTS * MOST : fixed_number(&r);
 	next->share = b->share / n;
 	if (w->o->lobe_samples == VIEW_LOBE_ENOUGH) {
@@ -227,7 +272,7 @@ void view_lobe_follow(struct view_walker *w, const struct view_branch *b,
 		parts = n < PARTS ? (int)n : PARTS;
 		r.first = b->index * (uint32_t)w->o->lobe_samples;
 		for (uint32_t i = 0; i < n; i++)
-			follow_sample(&r, i, &r.part[i * (uint32_t)parts / n]);
+			follow_both(&r, i, &r.part[i * (uint32_t)parts / n]);
 	}
 	for (int k = 0; k < w->v->m->bands; k++) {
 		w->directional[k] = directional[k];
@@ -238,6 +283,7 @@ void view_lobe_follow(struct view_walker *w, const struct view_branch *b,
 		w->cut[k] = cut[k] + w->cut[k] / n;
 		w->error[k] += sqrt(w->blurred[k] / n);
 	}
+	w->aim.sum = 0;
 	put_light(&r, parts, n, lit);
 }
 

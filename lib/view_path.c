@@ -129,6 +129,21 @@ static void add_error(struct view_walker *w, const struct view_branch *b, const 
 		                  s->across[i] * s->across[i] * view_blurred(w->v, far + i, part, 0));
 }
 
+/* What counts of an emitter that a sample of a lobe has met: it may be found by aiming, too. */
+static double aimed_share(const struct view_walker *w, const struct view_branch *b, const struct point *p)
+{
+	const struct view_images *s = &w->v->images;
+
+	if (!b->lobes || b->straight || b->turns < 0 || !(w->aim.sum > 0))
+		return 1;
+	uint32_t emitter = s->of[2 * p->element + (uint32_t)p->side];
+	if (emitter == UINT32_MAX)
+		return 1;
+	double other = view_aim_density(s, &w->aim, (size_t)b->turns * s->emitters.n + emitter,
+	                                b->reach + p->way, p->cosine);
+	return b->density / (b->density + other);
+}
+
 /* Adds what the point itself sends: emission and M / pi. */
 static void add_radiance(struct view_walker *w, const struct view_branch *b, struct point *p)
 {
@@ -157,8 +172,9 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b, str
 		return;
 	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] };
 	bsdf_emission(w->v->m, p->material, p->n, out, h);
+	double share = aimed_share(w, b, p);
 	for (size_t i = 0; i < bands; i++)
-		emission[i] += b->weight[i] * h[i];
+		emission[i] += b->weight[i] * share * h[i];
 }
 
 /* Adds the highlights of punctual lights, which no ray of a lobe can meet. */
@@ -225,7 +241,8 @@ static void branch_off(struct view_walker *w, const struct view_branch *b,
                        const struct point *p, const struct view_lobe *lobe, int through)
 {
 	struct view_branch next = { .lobes = b->lobes, .density = b->density, .share = b->share,
-	                            .index = b->index, .reach = b->lobes ? b->reach + p->way : 0 };
+	                            .index = b->index, .reach = b->lobes ? b->reach + p->way : 0,
+	                            .turns = b->turns, .aimed = b->aimed };
 	int side = through ? !p->side : p->side, ideal = isinf(lobe->k);
 
 	if (through)
@@ -235,10 +252,39 @@ static void branch_off(struct view_walker *w, const struct view_branch *b,
 	leave(w->v, p, side, next.org);
 	next.passes = through && ideal && b->passes;
 	next.seed = rng_mix(b->seed + 1 + (uint64_t)through);
+	if (b->lobes && !through)
+		next.turns = b->turns == 0 ? 1 + view_images_plane(&w->v->images, p->material, p->side, p->n, p->x)
+		                           : -1;
+	if (b->lobes && (!ideal || (!through && next.turns == 0)))
+		next.turns = -1;
 	if (ideal)
 		view_push(w, b, &next, lobe->coefficient, 1);
 	else if (!w->asking || !w->o->lobe_samples)
 		branch_into(w, b, p, lobe, side, &next);
+}
+
+/* Goes on along the one way that leads to an image; adds its emitter at the end. */
+static void follow_aimed(struct view_walker *w, const struct view_branch *b, struct point *p)
+{
+	const struct view_images *s = &w->v->images;
+	const struct view_side *seen = &w->v->side[2 * p->material + (uint32_t)p->side];
+	size_t image = b->aimed - 1;
+	int plane = (int)(image / s->emitters.n) - 1;
+	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] }, l[BANDS_MAX];
+
+	locate(w->v, p);
+	if (b->turns == 0 && plane >= 0 &&
+	    view_images_plane(s, p->material, p->side, p->n, p->x) == plane) {
+		branch_off(w, b, p, &seen->reflected, 0);
+	} else if (s->of[2 * p->element + (uint32_t)p->side] == image % s->emitters.n) {
+		if (b->straight || b->turns != plane + 1)
+			return;
+		bsdf_emission(w->v->m, p->material, p->n, out, l);
+		for (int i = 0; i < w->v->m->bands; i++)
+			w->directional[i] += b->weight[i] * l[i];
+	} else if (seen->transmitted.coefficient && isinf(seen->transmitted.k)) {
+		branch_off(w, b, p, &seen->transmitted, 1);
+	}
 }
 
 static void follow_branch(struct view_walker *w, const struct view_branch *b)
@@ -248,6 +294,10 @@ static void follow_branch(struct view_walker *w, const struct view_branch *b)
 
 	if (!see(v, b->org, b->dir, b->passes, &p, &w->rays))
 		return;
+	if (b->aimed) {
+		follow_aimed(w, b, &p);
+		return;
+	}
 	add_radiance(w, b, &p);
 	const struct view_side *s = &v->side[2 * p.material + (uint32_t)p.side];
 	if (!s->reflected.coefficient && !s->transmitted.coefficient)

@@ -9,6 +9,7 @@
 #include "lobe_table.h"
 #include "reconstruct.h"
 #include "view.h"
+#include "view_images.h"
 
 /* What one side of a material does with directional light that leaves it towards
  * the eye, by reflection or by transmission. */
@@ -38,6 +39,7 @@ struct view_scene {
 	struct view_side *side;     /* [2 materials] */
 	int lobes;                  /* there are finite lobes */
 	int tails;                  /* something reflects or transmits directionally */
+	struct view_images images;  /* if there are such */
 	int highlights;             /* there are punctual lights, and finite lobes */
 	struct light_ways ways;     /* of them, if so */
 	double ceiling[BANDS_MAX];  /* no radiance along an unsampled tail exceeds it */
@@ -64,6 +66,9 @@ struct view_branch {
 	int straight;               /* has met nothing since */
 	double density;             /* of its direction, by solid angle */
 	double reach;               /* way since */
+	int turns;                  /* it has come by ideal events alone: 0 through panes, 1 + k by
+	                               mirror plane k once; -1 any other way */
+	uint32_t aimed;             /* 1 + the image that it goes to, for nothing else; or 0 */
 	uint32_t index;             /* low-discrepancy point and */
 	uint64_t seed;              /* scramble of its next lobe sample */
 };
@@ -87,6 +92,7 @@ struct view_walker {
 	size_t waiting;
 	double diffuse[BANDS_MAX], directional[BANDS_MAX], emission[BANDS_MAX];
 	double lit[BANDS_MAX];      /* by emitters straight to the lobe that is sampled */
+	struct view_aim aim;        /* of that lobe's samples */
 	double error[BANDS_MAX];    /* of interpolated light */
 	double blurred[BANDS_MAX];  /* squares of it, that the samples of a lobe have summed up */
 	double cut[BANDS_MAX];

@@ -205,6 +205,7 @@ struct view_scene *view_scene_new(const struct model *m, const struct solution *
 	v->method = method;
 	if (!tabulate(v, e) && !interpolate(v, s, threads, e) && !find_misses(v, s, threads, e) &&
 	    ((method == VIEW_MESH && !v->lobes) || (v->direct = direct_new(m, rays, e))) &&
+	    (!v->lobes || !view_images_init(&v->images, m, e)) &&
 	    (!v->highlights || !light_ways_new(m, rays, &v->ways, e))) {
 		if (v->tails)
 			find_ceiling(v);
@@ -224,6 +225,7 @@ void view_scene_free(struct view_scene *v)
 	if (!v)
 		return;
 	direct_free(v->direct);
+	view_images_free(&v->images);
 	light_ways_free(&v->ways);
 	reconstruction_free(&v->all);
 	reconstruction_free(&v->part);
