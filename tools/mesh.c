@@ -140,6 +140,9 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 	if (refines && !r->solution)
 		cli_usage(c, "--refine-error, -smallest and -elements need --refine FILE.rad");
 	r->scene = argv[optind];
+	cli_keep_input(c, r->output, r->scene);
+	if (r->solution)
+		cli_keep_input(c, r->output, r->solution);
 }
 
 /* ---- options and report as JSON ---- */

@@ -66,6 +66,13 @@ sys.exit(not np.abs(2 * a - b).max() <= 1e-5 * b.max())' '$T/1.exr' '$T/2.exr'"
 
 refuses 1 "no light group 'lamp'; there are: ceiling lamp, lantern" "an unknown group" \
 	trace "$T/groups.rad" -c overview -o "$T/out" --mix lamp=2
+refuses 1 "'lantern' is not NAME=X" "no factor" \
+	trace "$T/groups.rad" -c overview -o "$T/out" --mix lantern
+refuses 1 "beyond the range of 32-bit floats" "a factor that no picture holds" \
+	trace "$T/groups.rad" -c overview -s 8x6 -o "$T/out" --mix lantern=1e300
+prepare trace -q "$T/groups.rad" -c overview -s 8x6 -o "$T/1.exr" --mix lantern=0,"ceiling lamp=2"
+prepare trace -q "$T/groups.rad" -c overview -s 8x6 -o "$T/2.exr" --mix lantern=0 --mix "ceiling lamp=2"
+check "--mix twice" exrcmp --max-rel 0 "$T/1.exr" "$T/2.exr"
 refuses 1 "solve with shoot --light-groups" "a group of a solution without" \
 	trace "$T/one.rad" -c overview -o "$T/out" --mix lantern=2
 for wrong in "lantern=-1" "lantern=x" "lantern=1:2" "lantern=1:2:3:4" "lantern=1;all=2"; do
