@@ -14,7 +14,7 @@
 #define REVISION_MESH "4"
 #define REVISION_FF "9"
 #define REVISION_RAD "10"
-#define REVISION_VIEW "5"
+#define REVISION_VIEW "7"
 
 /* Strings are owned (malloc) and may be NULL. */
 struct cache_info {
