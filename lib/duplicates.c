@@ -122,7 +122,7 @@ static int plane_quad(const struct model *m, uint32_t g, uint32_t h)
 	v3_sub(&m->vertex[3 * (size_t)half_apex(m->triangle, h)],
 	       &m->vertex[3 * (size_t)half_from(m->triangle, g)], d);
 	v3_normalise(n);
-	return v3_dot(n, o) > 0 && fabs(v3_dot(n, d)) <= 1e-9 * v3_length(d);
+	return v3_dot(n, o) > 0 && fabs(v3_dot(n, d)) <= 1e-6 * v3_length(d);
 }
 
 /* Quads with the same corners: those that lose both triangles to the first. */

@@ -11,6 +11,8 @@
 struct imprint_limits {
 	double size;      /* of elements: triangles with no longer edge are left alone, m */
 	double thick;     /* what lies this close to a plane lies in it, m */
+	double close;     /* so does what stays on one side of it this close: so little light
+	                     comes between that elements show none of it, m */
 	double apart;     /* points of a cut this close are one, m */
 	double shortest;  /* contacts along shorter pieces of the other triangle are left out, m */
 };

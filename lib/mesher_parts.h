@@ -43,8 +43,9 @@ int clean_separate(struct model *m, uint32_t **group, struct err *e);
 /* Removes the triangles with keep[t] = 0 from all triangle arrays. */
 void clean_compact(struct model *m, const uint8_t *keep);
 
-/* position[v] = number of the place of vertex v, the same for vertices of
- * different surfaces that coincide. To be freed; NULL and e on failure. */
+/* position[v] = number of the place of vertex v, the same for vertices of different surfaces
+ * that coincide, to 2^-22 of the scene's diagonal: what float32 positions are off by once
+ * their nodes have moved them. To be freed; NULL and e on failure. */
 uint32_t *clean_positions(const struct model *m, size_t *places, struct err *e);
 
 /* duplicates.c: drops triangles, and pairs that make up the same plane quad,

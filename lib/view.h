@@ -66,6 +66,10 @@ struct view_scene *view_scene_new(const struct model *m, const struct solution *
                                   int threads, struct err *e);
 void view_scene_free(struct view_scene *v);
 
+/* 1 if highlights may be missing: of punctual lights that curved mirrors turn, or plane ones
+ * more often than there are images for (lib/light_way.h). */
+int view_misses(const struct view_scene *v);
+
 /* The mask of a comma-separated list of layers (diffuse, directional, emission, Z,
  * N, element, patch, all) into layers. 0, or -1 with an unknown name. */
 int view_parse_layers(const char *list, unsigned *layers);

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "direct.h"
+#include "light_way.h"
 #include "reconstruct.h"
 #include "view.h"
 
@@ -35,6 +36,7 @@ struct view_scene {
 	struct view_side *side;     /* [2 materials] */
 	int tails;                  /* something reflects or transmits directionally */
 	int highlights;             /* there are punctual lights, and finite lobes */
+	struct light_ways ways;     /* of them, if so */
 	double ceiling[BANDS_MAX];  /* no radiance along an unsampled tail exceeds it */
 };
 

@@ -187,7 +187,8 @@ struct view_scene *view_scene_new(const struct model *m, const struct solution *
 	v->rays = rays;
 	v->method = method;
 	if (!tabulate(v, e) && !interpolate(v, s, threads, e) && !find_misses(v, s, threads, e) &&
-	    (method == VIEW_MESH || (v->direct = direct_new(m, rays, e)))) {
+	    (method == VIEW_MESH || (v->direct = direct_new(m, rays, e))) &&
+	    (!v->highlights || !light_ways_new(m, rays, &v->ways, e))) {
 		if (v->tails)
 			find_ceiling(v);
 		return v;
@@ -196,11 +197,17 @@ struct view_scene *view_scene_new(const struct model *m, const struct solution *
 	return NULL;
 }
 
+int view_misses(const struct view_scene *v)
+{
+	return v->highlights && !v->ways.images.complete;
+}
+
 void view_scene_free(struct view_scene *v)
 {
 	if (!v)
 		return;
 	direct_free(v->direct);
+	light_ways_free(&v->ways);
 	reconstruction_free(&v->all);
 	reconstruction_free(&v->part);
 	free(v->miss);

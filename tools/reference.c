@@ -230,9 +230,9 @@ static int make_picture(const struct reference *r, int argc, char **argv, struct
 	if (bad)
 		return -1;
 	report_picture(r, relative, seconds);
-	if (pathtrace_misses(&r->m))
-		cli_warn(&r->cli, "%s: light of punctual lights that mirrors turn is missing from the "
-		         "picture; compare --irradiance", r->mesh);
+	if (pathtrace_misses(r->tracer))
+		cli_warn(&r->cli, "%s: light of punctual lights that curved mirrors turn, or plane "
+		         "ones very often, is missing from the picture; compare --irradiance", r->mesh);
 	if (pathtrace_diverges(&r->m))
 		cli_warn(&r->cli, "%s: the variance of eye paths over the paper's lobe diverges: do "
 		         "not rely on the picture's standard error; compare --irradiance, or use "

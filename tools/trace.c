@@ -322,7 +322,12 @@ static int read_scene(struct trace *t, int argc, char **argv, struct err *e)
 	         "in %.3f s, ray structure in %.3f s, interpolation in %.3f s", t->rad,
 	         t->m.triangles, t->m.elements, t->m.bands, t->m.bands == 1 ? "" : "s",
 	         read - begun, built - read, ready - built);
-	return t->scene ? 0 : -1;
+	if (!t->scene)
+		return -1;
+	if (view_misses(t->scene))
+		cli_warn(&t->cli, "%s: highlights of punctual lights that curved mirrors turn, or plane "
+		         "ones very often, are not modelled", t->rad);
+	return 0;
 }
 
 /* The bound on what is missing, relative to the picture's mean radiance. */
