@@ -124,7 +124,7 @@ static void test_round_trip(void **state)
 				round_trip(size[s][0], size[s][1], (enum exr_file_compression)c, half);
 }
 
-/* Bytes of a picture of floats whose rows from `noisy` on are all different. */
+/* Bytes of a picture of floats. From row `noisy` on 11 of 12 differ from all others. */
 static size_t size_with_noise(int noisy, enum exr_file_compression compression)
 {
 	enum { WIDTH = 64, HEIGHT = 512 };
@@ -138,7 +138,7 @@ static size_t size_with_noise(int noisy, enum exr_file_compression compression)
 	assert_int_equal(image_new(&a, WIDTH, HEIGHT, 3, rgb, &e), 0);
 	for (int c = 0; c < 3; c++)
 		for (int i = noisy * WIDTH; i < WIDTH * HEIGHT; i++)
-			image_plane(&a, c)[i] = (float)exp2(100 * (rng_uniform(&g) - .5));
+			image_plane(&a, c)[i] = c > 0 || i % 4 ? (float)rng_uniform(&g) : 0;
 	assert_int_equal(exr_file_write(place("a.exr"), &a, NULL, &o, NULL, &e), 0);
 	assert_int_equal(exr_file_read(place("a.exr"), &b, NULL, &e), 0);
 	for (int c = 0; c < 3; c++)
@@ -154,12 +154,11 @@ static size_t size_with_noise(int noisy, enum exr_file_compression compression)
 static void test_auto(void **state)
 {
 	(void)state;
-	size_t none = size_with_noise(0, EXR_FILE_NONE), half = size_with_noise(256, EXR_FILE_ZIP);
+	size_t zip = size_with_noise(0, EXR_FILE_ZIP), half = size_with_noise(256, EXR_FILE_ZIP);
 
-	assert_true(size_with_noise(0, EXR_FILE_ZIP) < none * 96 / 100);
-	assert_true(size_with_noise(0, EXR_FILE_AUTO) > none * 97 / 100);
-	assert_true(half < none * 6 / 10);
-	assert_true(size_with_noise(256, EXR_FILE_AUTO) < half * 105 / 100);
+	assert_true(size_with_noise(0, EXR_FILE_AUTO) > zip * 101 / 100);
+	assert_true(half < zip * 6 / 10);
+	assert_true(size_with_noise(256, EXR_FILE_AUTO) < half * 108 / 100);
 	assert_int_equal(size_with_noise(512, EXR_FILE_AUTO), size_with_noise(512, EXR_FILE_ZIP));
 }
 
