@@ -92,6 +92,7 @@ static void parse(struct reference *r, int argc, char **argv)
 	if (argc - optind != 1)
 		cli_usage(c, argc == optind ? "a .mesh file is needed" : "one .mesh file at a time");
 	r->mesh = argv[optind];
+	cli_keep_input(c, r->output, r->mesh);
 	if (r->irradiance && (r->camera || r->width))
 		cli_usage(c, "--irradiance has no camera and no size");
 	if (r->irradiance && r->o.centre)

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -59,6 +60,15 @@ void cli_usage(const struct cli *c, const char *format, ...)
 	va_end(ap);
 	fprintf(stderr, "Try '%s --help' for more information.\n", c->program);
 	exit(2);
+}
+
+void cli_keep_input(const struct cli *c, const char *output, const char *input)
+{
+	struct stat to, from;
+
+	if (output && !stat(output, &to) && !stat(input, &from) && S_ISREG(from.st_mode) &&
+	    to.st_dev == from.st_dev && to.st_ino == from.st_ino)
+		cli_usage(c, "--output: %s is what is to be read", output);
 }
 
 void cli_warn(const struct cli *c, const char *format, ...)
