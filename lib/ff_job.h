@@ -137,6 +137,10 @@ int ff_find_chain_most(struct ff_job *j, struct err *e);
 /* Fills job->element. O(elements). */
 void ff_element_table(struct ff_job *j);
 
+/* The element of a patch that a number in [0,1) chooses by area; what is left of the
+ * number, again uniform, replaces it. */
+uint32_t ff_choose(const struct ff_job *j, uint32_t patch, double *u);
+
 /* A point on a patch, uniform by area, from two numbers in [0,1): its element and
  * position (on the surface, not moved off it). */
 uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, double x[3]);

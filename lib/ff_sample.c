@@ -58,9 +58,8 @@ void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3])
 		n[k] = s * j->m->element_normal[3 * (size_t)element + (size_t)k];
 }
 
-/* The element of a patch that a number in [0,1) chooses by area; what is left of the
- * number, again uniform, replaces it. Binary search without branches to mispredict. */
-static uint32_t choose(const struct ff_job *j, uint32_t patch, double *u)
+/* Binary search without branches to mispredict. */
+uint32_t ff_choose(const struct ff_job *j, uint32_t patch, double *u)
 {
 	uint32_t first = j->m->patch_start[patch], lo = first;
 	uint32_t n = j->m->patch_start[patch + 1] - first;
@@ -78,7 +77,7 @@ static uint32_t choose(const struct ff_job *j, uint32_t patch, double *u)
 
 uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, double x[3])
 {
-	uint32_t i = choose(j, patch, &u0);
+	uint32_t i = ff_choose(j, patch, &u0);
 	const struct ff_element *el = &j->element[i];
 	double r = sqrt(u0), w1 = r * (1 - u1), w2 = r * u1;
 
