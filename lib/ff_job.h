@@ -130,6 +130,26 @@ struct ff_thread {
 	struct vec chain_map;     /* local -> whole */
 };
 
+static inline int ff_by_formula(const struct ff_options *o)
+{
+	return o->method == FF_ANALYTIC || o->method == FF_AUTO;
+}
+
+/* What a job needs whatever it makes. O(elements + triangles log triangles). 0, or -1 and e;
+ * either way free it. */
+int ff_job_init(struct ff_job *j, const struct model *m, const struct ff_options *o,
+                struct err *e);
+void ff_job_free(struct ff_job *j);
+
+/* What rows that are computed one by one, of patches or of lights alone, need beside. */
+int ff_job_prepare(struct ff_job *j, int patches, struct err *e);
+
+/* Fills job->of_rows, of_gathering, of_small. O(points log points). 0, or -1 and e. */
+int ff_points(struct ff_job *j, struct err *e);
+
+int ff_thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e);
+void ff_thread_free(struct ff_thread *t);
+
 /* Sets job->chain_most: as high as keeps chains few, by what a few rays meet. O(depth)
  * rays. 0, or -1 and e. */
 int ff_find_chain_most(struct ff_job *j, struct err *e);
