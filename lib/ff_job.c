@@ -37,6 +37,7 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 	j->shoots_lobe[ps] = emits && !plain;
 	j->has_lobe[ps] = bsdf_has_lobe(mt, material, side, 0) ||
 	                  bsdf_has_lobe(mt, material, side, 1);
+	j->lobes += j->has_lobe[ps];
 	j->is_ideal[ps] = bsdf_has_ideal(mt, material, side, 0) ||
 	                  bsdf_has_ideal(mt, material, side, 1);
 	j->has_panes |= bsdf_has_ideal(mt, material, side, 1);
@@ -103,7 +104,7 @@ void ff_job_free(struct ff_job *j)
 {
 	void *array[] = { j->element, j->shoots_diffuse, j->shoots_lobe, j->has_lobe,
 		j->is_source, j->emits, j->is_ideal, j->is_black, j->of_rows.bits,
-		j->of_gathering.bits, j->of_small.bits, j->mirror };
+		j->of_gathering.bits, j->of_small.bits, j->mirror, j->halvings };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);

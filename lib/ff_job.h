@@ -10,8 +10,10 @@
 #include "ray.h"
 #include "rng.h"
 
-/* FF_CLOSE_RAYS: a power of two that an element close to an emitter casts. */
-enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048 };
+/* FF_CLOSE_RAYS: a power of two that an element close to an emitter casts.
+ * FF_HALVINGS: the most of a row's rays. */
+enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048,
+       FF_HALVINGS = 3 };
 
 /* An element as a place to send rays from. Points are corner + w1 edge[0] + w2 edge[1],
  * with weights that keep a little clear of the edges. Threes are padded to four. */
@@ -22,6 +24,7 @@ struct ff_element {
 	double per_area;
 	uint32_t before;          /* 2^32 times the part of the patch's area before it */
 	float per_part;           /* 1 / the same of its own area */
+	double size;              /* root of its area, or how far its corners are from its centre */
 };
 
 /* The first points of the Sobol sequence, in an order in which neighbours have similar
@@ -70,6 +73,7 @@ struct ff_job {
 	uint8_t *emits;           /* [2P] gives light of its own */
 	uint8_t *is_source;       /* [2P] any light leaves here */
 	uint32_t chain_most;      /* where counts of ideal events of a colour stop */
+	uint32_t lobes;           /* patch-sides that have one */
 	int has_panes, has_ideal; /* any clear pane; any ideal surface */
 	struct ff_mirror *mirror; /* [mirrors] planes with images of lights; none if they are */
 	size_t mirrors;           /* so many that only rays will do */
@@ -78,6 +82,7 @@ struct ff_job {
 	struct ff_samples of_rows, of_gathering, of_small;
 	struct tally_places places;
 	struct ff_gather gather;
+	uint8_t *halvings;        /* [2P] how often the rays of a row are halved; NULL: never */
 	struct ff_formula formula;
 };
 
@@ -217,6 +222,20 @@ static inline uint32_t ff_gather_rays(const struct ff_job *j, uint32_t element)
 {
 	return j->m->element_area[element] < j->small_area ? j->o.gather / 4 : j->o.gather;
 }
+
+/* Rays that a patch-side's diffuse row casts, if any. */
+static inline uint32_t ff_row_rays(const struct ff_job *j, uint32_t ps)
+{
+	return j->emits[ps] ? j->o.rays * j->o.emitter_gain
+	                    : j->o.rays >> (j->halvings ? j->halvings[ps] : 0);
+}
+
+/* How often the rays of a row can be halved so that each replicate is a whole number. */
+int ff_most_halvings(uint32_t rays);
+
+/* Sets job->halvings by what was gathered: rows that carry less light than others cast fewer
+ * rays. O(pairs seen). 0, or -1 and e. */
+int ff_share_rays(struct ff_job *j, struct err *e);
 
 /* Casts ff_gather_rays rays from every element-side that is modelled and no ideal mirror or
  * pane, jointly stratified over its area and hemisphere, into j->gather; adds to *rays.

@@ -26,7 +26,7 @@
 enum {
 	MIN_LOBE_RAYS = 16, MIN_EMITTER_RAYS = 64, /* for any one link and lobe */
 	BIN_RAYS = 64,
-	EMITTER_LANDINGS = 16, /* see cluster_rays */
+	EMITTER_LANDINGS = 16, FEW_LOBES = 256, /* see cluster_rays */
 	CLUSTER_SHARE = 128,  /* sources are joined up to one CLUSTER_SHARE-th of the rays */
 	PROBES = 4,           /* point pairs tried for emitters that no ray met */
 	BIN_RINGS = 3, BIN_SECTORS = 8
@@ -383,7 +383,8 @@ static size_t cluster_end(const struct ff_job *j, const struct capture *c, size_
 /* Rays for the rows of a cluster that is `share` of what the patch-side sees. Emitters, whose
  * light is brightest, share emitter_gain times what the others do, but each gets no more than
  * EMITTER_LANDINGS times what its own row would send here of as many: where it is small or
- * far, its light on the patch-side is a small part of what it gives. */
+ * far, its light on the patch-side is a small part of what it gives. Lobes that are few are
+ * all that evens out one another's noise, so they get more. */
 static uint32_t cluster_rays(const struct ff_job *j, uint32_t ps, const struct capture *c,
                              double share, size_t emitters)
 {
@@ -391,9 +392,10 @@ static uint32_t cluster_rays(const struct ff_job *j, uint32_t ps, const struct c
 
 	if (ff_emits(j, c->source)) {
 		double all = (double)j->o.lobe_rays * j->o.emitter_gain;
-		double landing = is_light(j, c->source) ? 1
-		               : share * j->m->patch_area[ps >> 1] / j->m->patch_area[c->source >> 1];
-		rays = all * fmin(1. / (double)emitters, EMITTER_LANDINGS * landing);
+		double lands = is_light(j, c->source) ? 1
+		             : share * j->m->patch_area[ps >> 1] / j->m->patch_area[c->source >> 1];
+		lands *= EMITTER_LANDINGS * fmax(1, FEW_LOBES / (double)j->lobes);
+		rays = all * fmin(1. / (double)emitters, lands);
 		least = MIN_EMITTER_RAYS;
 	}
 	return (uint32_t)fmax(least, fmin(rays, UINT32_MAX));

@@ -8,6 +8,20 @@
 
 #define PI 3.14159265358979323846
 
+/* From the centre of a triangle to its farthest corner, by the edges from one corner. */
+static double reach(const double a[4], const double b[4])
+{
+	double far = 0;
+
+	for (int i = 0; i < 3; i++) {
+		double s = i == 1 ? 2 : -1, t = i == 2 ? 2 : -1, d[3];
+		for (int k = 0; k < 3; k++)
+			d[k] = (s * a[k] + t * b[k]) / 3;
+		far = fmax(far, v3_length(d));
+	}
+	return far;
+}
+
 static void fill_element(const struct ff_job *j, uint32_t i)
 {
 	const struct model *m = j->m;
@@ -23,6 +37,7 @@ static void fill_element(const struct ff_job *j, uint32_t i)
 	v3_frame(normal, tangent[0], tangent[1]);
 	for (int k = 0; k < 2; k++)
 		v3_sub(&m->vertex[3 * (size_t)c[k + 1]], a, el->edge[k]);
+	el->size = fmax(sqrt(m->element_area[i]), reach(el->edge[0], el->edge[1]));
 	for (int k = 0; k < 3; k++) {
 		el->corner[k] = a[k] + inset / 3 * (el->edge[0][k] + el->edge[1][k]);
 		el->edge[0][k] *= 1 - inset;

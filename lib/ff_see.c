@@ -60,7 +60,7 @@ static struct outlook look(const struct ff_job *j, uint32_t source, uint32_t col
 {
 	const double *c = j->gather.centre[source >> 1];
 	double x[3], d[3], nx[3], ny[3], area = j->m->element_area[column >> 1];
-	double size = c[3] + sqrt(area);
+	double size = c[3] + j->element[column >> 1].size;
 
 	point_on(&j->element[column >> 1], 4. / 9, .5, x);
 	ff_normal(j, column >> 1, (int)(column & 1), nx);
