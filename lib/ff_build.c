@@ -262,6 +262,8 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 	if (!bad)
 		bad = matrix ? build_matrix(&job, whole, stats, sink, progress, e)
 		             : build_rows(&job, 1, whole, stats, sink, progress, e);
+	if (o->method == FF_HEMICUBE) /* rows say what they are worth */
+		stats->samples = (double)stats->rows[FF_DIFFUSE] * (double)job.grid.pixels * o->points;
 	if (stats->rows[FF_DIFFUSE])
 		stats->mean_error /= (double)stats->rows[FF_DIFFUSE];
 	ff_job_free(&job);

@@ -125,6 +125,7 @@ int ff_thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e)
 	*t = (struct ff_thread){ .job = j };
 	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, j->chain_most, e))
 		return -1;
+	t->tally.dependent = j->o.method == FF_HEMICUBE; /* pixels of a cube share its place */
 	if (j->formula.on) {
 		t->formula = mem_new(1, sizeof *t->formula, "formulas", e);
 		if (!t->formula)
