@@ -85,7 +85,7 @@ int ff_job_init(struct ff_job *j, const struct model *m, const struct ff_options
 	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
 		side_flags(j, ps);
 	ff_element_table(j);
-	return m->light.n ? ff_mirrors(j, e) : 0;
+	return light_images_new(m, ray_offset(j->rays), 1, SIZE_MAX, 0, &j->images, e);
 }
 
 int ff_job_prepare(struct ff_job *j, int patches, struct err *e)
@@ -104,10 +104,11 @@ void ff_job_free(struct ff_job *j)
 {
 	void *array[] = { j->element, j->shoots_diffuse, j->shoots_lobe, j->has_lobe,
 		j->is_source, j->emits, j->is_ideal, j->is_black, j->of_rows.bits,
-		j->of_gathering.bits, j->of_small.bits, j->mirror, j->halvings };
+		j->of_gathering.bits, j->of_small.bits, j->halvings };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
+	light_images_free(&j->images);
 	locator_free(&j->locator);
 	tally_places_free(&j->places);
 	ff_gather_free(&j->gather);

@@ -7,6 +7,7 @@
 #include "ff_tally.h"
 #include "hemicube.h"
 #include "locate.h"
+#include "mirror.h"
 #include "ray.h"
 #include "rng.h"
 
@@ -49,13 +50,6 @@ struct ff_gather {
 	                             taken as its own */
 };
 
-/* A plane of ideal mirrors of one material; n points to the side that reflects. */
-struct ff_mirror {
-	double n[3], offset;
-	uint32_t material;
-	int side;
-};
-
 /* Shared, read-only while rows are computed. */
 struct ff_job {
 	const struct model *m;
@@ -75,8 +69,7 @@ struct ff_job {
 	uint32_t chain_most;      /* where counts of ideal events of a colour stop */
 	uint32_t lobes;           /* patch-sides that have one */
 	int has_panes, has_ideal; /* any clear pane; any ideal surface */
-	struct ff_mirror *mirror; /* [mirrors] planes with images of lights; none if they are */
-	size_t mirrors;           /* so many that only rays will do */
+	struct light_images images; /* in one mirror each */
 	double small_area;        /* elements below gather with a quarter of the rays: what they
 	                             lack weighs little */
 	struct ff_samples of_rows, of_gathering, of_small;
@@ -281,24 +274,11 @@ void ff_share_pixels(struct ff_thread *t, uint32_t ps);
 
 int ff_patch_hemicube(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
 
-/* Finds job->mirror. O(triangles). 0, or -1 and e. */
-int ff_mirrors(struct ff_job *j, struct err *e);
-
-/* The image of a light in a mirror; its arrays are those of *i. 0 if it has none, being
- * behind or in the plane. */
-struct ff_image {
-	struct lights l;          /* one */
-	double position[3], direction[3], cone[2], cosine[2], unit_flux;
-	uint8_t kind;
-};
-int ff_image(const struct ff_job *j, const struct ff_mirror *mirror, size_t light,
-             struct ff_image *i);
-
 /* The chain of events that a light's rays pass from `to` to `from`: straight and through
  * clear panes; or by way of a mirror, when the ray from `from` towards the image meets it
  * first. CHAIN_NONE if anything else is in their way. */
 uint32_t ff_clear_way(struct ff_thread *t, const double from[3], const double to[3]);
-uint32_t ff_mirror_way(struct ff_thread *t, const struct ff_mirror *mirror, size_t light,
+uint32_t ff_mirror_way(struct ff_thread *t, const struct mirror_plane *mirror, size_t light,
                        const double from[3], const double toward[3]);
 
 /* The row of a punctual light into the batch; none if it has no flux. 0, or -1 and e.
