@@ -201,6 +201,18 @@ static double total(const double *energy, size_t n)
 	return sum;
 }
 
+/* Of the elements' energies, what stays because they are about as small as they may become:
+ * nothing else is to make up for that. The rest is what all halvings can take to the same
+ * part of it everywhere. */
+static double stuck(const struct plan *p)
+{
+	double sum = 0, all = 1 - pow(left, HALVINGS_MAX);
+
+	for (size_t i = 0; i < p->m->elements; i++)
+		sum += p->energy[i] * (1 - (1 - pow(left, p->most[i])) / all);
+	return sum;
+}
+
 static int find_patch_energies(struct plan *p, const struct solution *s, struct err *e)
 {
 	struct patch_frame *frame = patch_frames(p->m, e);
@@ -248,7 +260,8 @@ int adapt_plan(const struct model *m, const struct solution *s, const struct mes
 		find_room(&p, smallest);
 		double own = total(p.energy, m->elements);
 		double others = total(p.patch_energy, m->patches);
-		p.allowed = fmax(o->error * o->error * unit, once * (own + others));
+		double stays = stuck(&p);
+		p.allowed = stays + fmax(o->error * o->error * unit, once * (own + others - stays));
 		double bound = own + others <= p.allowed ? INFINITY : find_bound(&p);
 		double expected = expect(&p, bound, &elements);
 		count_marked(&p, bound, r);

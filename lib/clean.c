@@ -189,10 +189,11 @@ uint32_t *clean_positions(const struct model *m, size_t *places, struct err *e)
 {
 	uint32_t *group = mem_new(m->vertices, sizeof *group, "positions", e);
 	uint32_t *position = mem_new(m->vertices, sizeof *position, "positions", e);
-	double lo[3], hi[3], tolerance;
+	double lo[3], hi[3], d[3], tolerance;
 
 	scene_box(m, lo, hi);
-	tolerance = weld_tolerance(lo, hi);
+	v3_sub(hi, lo, d);
+	tolerance = fmax(0x1p-22 * v3_length(d), weld_tolerance(lo, hi));
 	struct weld w = { m->vertices, m->vertex, group, 1, &tolerance, m->triangles,
 		          m->triangle };
 	if (!group || !position || weld_points(&w, position, places, e)) {

@@ -25,6 +25,7 @@ struct cut {
 	uint32_t plane;           /* the lowest of these triangles */
 	int flush;                /* 1: it is the border of triangles in that same plane, so
 	                             that only inside the other one something changes */
+	double shortest;          /* a shorter one is left out */
 	double end[2][3];
 	double along[2];          /* of the ends, on the common line of both planes */
 };
@@ -131,10 +132,10 @@ static int clip(const struct search *s, uint32_t a, double end[2][3], int *rim)
 
 /* Notes that triangle b meets the plane of triangle a between p and q. */
 static int add_cut(struct search *s, uint32_t a, uint32_t b, const double p[3],
-                   const double q[3], int flush)
+                   const double q[3], int flush, double shortest)
 {
 	const double *given[2] = { p, q }, *n = s->normal[a];
-	struct cut c = { .plane = sets_find(s->plane, b), .flush = flush };
+	struct cut c = { .plane = sets_find(s->plane, b), .flush = flush, .shortest = shortest };
 	double d[3];
 
 	for (int i = 0; i < 2; i++) {
@@ -161,13 +162,31 @@ static int add_crossing(struct search *s, uint32_t a, uint32_t b, const double h
 			v3_mad(p, height[k] / (height[k] - height[next]), d, end[n++]);
 		}
 	}
-	return n == 2 ? add_cut(s, a, b, end[0], end[1], 0) : 0;
+	return n == 2 ? add_cut(s, a, b, end[0], end[1], 0, s->limits->shortest) : 0;
+}
+
+/* Triangle b stays on one side of the plane of a: what little light comes through between
+ * them shows in no element, so that the parts of its border which are close count as if
+ * they stood on it. */
+static int add_close(struct search *s, uint32_t a, uint32_t b, const double height[3])
+{
+	int status = 0, close = 0;
+
+	for (int k = 0; k < 3; k++)
+		close += fabs(height[k]) <= s->limits->close;
+	for (uint32_t k = 0; k < 3 && !status; k++)
+		if (fabs(height[k]) <= s->limits->close &&
+		    fabs(height[(k + 1) % 3]) <= s->limits->close && coplanar(s, 3 * b + k) == b)
+			status = add_cut(s, a, b, corner(s->m, b, (int)k),
+			                 corner(s->m, b, (int)(k + 1) % 3), close == 3,
+			                 s->limits->shortest);
+	return status;
 }
 
 static int add_pair(struct search *s, uint32_t a, uint32_t b)
 {
 	double height[3], d[3];
-	int flat = 0, status = 0;
+	int flat = 0, above = 0, below = 0, status = 0;
 
 	for (int k = 0; k < 3; k++) {
 		v3_sub(corner(s->m, b, k), corner(s->m, a, 0), d);
@@ -175,14 +194,16 @@ static int add_pair(struct search *s, uint32_t a, uint32_t b)
 		if (fabs(height[k]) <= s->limits->thick)
 			height[k] = 0;
 		flat += height[k] == 0;
+		above += height[k] > 0;
+		below += height[k] < 0;
 	}
 	if (flat < 2)
-		return add_crossing(s, a, b, height);
+		return above && below ? add_crossing(s, a, b, height) : add_close(s, a, b, height);
 	for (int k = 0; k < 3 && !status; k++)
 		if (height[k] == 0 && height[(k + 1) % 3] == 0 &&
 		    (flat < 3 || coplanar(s, 3 * b + (uint32_t)k) == b))
 			status = add_cut(s, a, b, corner(s->m, b, k), corner(s->m, b, (k + 1) % 3),
-			                 flat == 3);
+			                 flat == 3, flat == 3 ? s->limits->flush : s->limits->shortest);
 	return status;
 }
 
@@ -261,7 +282,7 @@ static int add_contact(struct search *s, uint32_t a, const struct cut *cut)
 		if (cut->flush || s->g->start[edge + 1] - s->g->start[edge] < 2)
 			return 0;
 	}
-	if (v3_length(d) < s->limits->shortest) {
+	if (v3_length(d) < cut->shortest) {
 		s->out->fine++;
 		return 0;
 	}
@@ -271,7 +292,7 @@ static int add_contact(struct search *s, uint32_t a, const struct cut *cut)
 static int search_triangle(struct search *s, uint32_t a)
 {
 	s->near.n = s->cut.n = 0;
-	if (boxes_find(&s->boxes, &s->boxes.box[a], s->limits->thick, &s->near, s->e))
+	if (boxes_find(&s->boxes, &s->boxes.box[a], s->limits->close, &s->near, s->e))
 		return -1;
 	const uint32_t *b = s->near.data;
 	for (size_t i = 0; i < s->near.n; i++)

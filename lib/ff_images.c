@@ -1,4 +1,4 @@
-/* Images of punctual lights in plane mirrors, and the ways that their rays take. */
+/* The ways that rays of punctual lights and of their images in plane mirrors take. */
 #include <math.h>
 #include <string.h>
 
@@ -6,88 +6,6 @@
 #include "ff_job.h"
 #include "light.h"
 #include "vec3.h"
-
-/* Planes of mirrors beyond which images cost more than rays. */
-enum { MIRRORS_MOST = 16 };
-
-/* Corners have float32 coordinates: normals and, over the size of the scene, heights of
- * one plane differ by this. */
-static const double same_plane = 1e-6;
-
-static double scene_size(const struct model *m)
-{
-	double size[3];
-
-	v3_sub(m->light.box[1], m->light.box[0], size);
-	return v3_length(size);
-}
-
-/* 1 if a point of a triangle with this normal, of the side that reflects, is the mirror's. */
-static int on_mirror(const struct model *m, const struct ff_mirror *k, const double n[3],
-                     const double x[3])
-{
-	return v3_dot(n, k->n) > 1 - same_plane &&
-	       fabs(v3_dot(x, k->n) - k->offset) <= same_plane * scene_size(m);
-}
-
-static int add_mirror(struct ff_job *j, struct vec *list, size_t triangle, int side,
-                      struct err *e)
-{
-	const struct model *m = j->m;
-	const uint32_t *c = &m->triangle[3 * triangle];
-	const double *x = &m->vertex[3 * (size_t)c[0]];
-	const struct ff_mirror *have = list->data;
-	struct ff_mirror new = { .side = side,
-	                         .material = m->surface.material[m->triangle_surface[triangle]] };
-
-	v3_area(x, &m->vertex[3 * (size_t)c[1]], &m->vertex[3 * (size_t)c[2]], new.n);
-	v3_normalise(new.n);
-	for (int k = 0; k < 3 && side == BACK; k++)
-		new.n[k] = -new.n[k];
-	new.offset = v3_dot(x, new.n);
-	for (size_t i = 0; i < list->n; i++)
-		if (have[i].material == new.material && have[i].side == side &&
-		    on_mirror(m, &have[i], new.n, x))
-			return 0;
-	return vec_append(list, &new, 1, sizeof new, e);
-}
-
-int ff_mirrors(struct ff_job *j, struct err *e)
-{
-	const struct model *m = j->m;
-	struct vec list = { 0 };
-	int bad = 0;
-
-	for (size_t t = 0; !bad && t < m->triangles && list.n <= MIRRORS_MOST; t++)
-		for (int side = FRONT; !bad && side <= BACK; side++)
-			if (bsdf_has_ideal(&m->material, m->surface.material[m->triangle_surface[t]],
-			                   side, 0))
-				bad = add_mirror(j, &list, t, side, e);
-	j->mirror = list.data;
-	j->mirrors = list.n <= MIRRORS_MOST ? list.n : 0;
-	return bad;
-}
-
-int ff_image(const struct ff_job *j, const struct ff_mirror *mirror, size_t light,
-             struct ff_image *i)
-{
-	const struct lights *l = &j->m->light;
-	const double *x = &l->position[3 * light], *d = &l->direction[3 * light];
-	double towards = v3_dot(d, mirror->n), height = v3_dot(x, mirror->n) - mirror->offset;
-
-	*i = (struct ff_image){ .kind = l->kind[light], .unit_flux = l->unit_flux[light] };
-	if (i->kind == LIGHT_DIRECTIONAL ? !(towards < 0) : !(height > ray_offset(j->rays)))
-		return 0;
-	v3_mad(x, i->kind == LIGHT_DIRECTIONAL ? 0 : -2 * height, mirror->n, i->position);
-	v3_mad(d, -2 * towards, mirror->n, i->direction);
-	memcpy(i->cone, &l->cone[2 * light], sizeof i->cone);
-	memcpy(i->cosine, &l->cosine[2 * light], sizeof i->cosine);
-	i->l = (struct lights){ .n = 1, .kind = &i->kind, .position = i->position,
-	                        .direction = i->direction, .cone = i->cone, .cosine = i->cosine,
-	                        .unit_flux = &i->unit_flux };
-	memcpy(i->l.box, l->box, sizeof l->box);
-	return 1;
-}
 
 /* A ray's way through clear panes: where it is, and the events passed. */
 struct way {
@@ -146,7 +64,7 @@ uint32_t ff_clear_way(struct ff_thread *t, const double from[3], const double to
 	return way_to(t, to, &w);
 }
 
-uint32_t ff_mirror_way(struct ff_thread *t, const struct ff_mirror *mirror, size_t light,
+uint32_t ff_mirror_way(struct ff_thread *t, const struct mirror_plane *mirror, size_t light,
                        const double from[3], const double toward[3])
 {
 	const struct ff_job *j = t->job;
@@ -165,8 +83,8 @@ uint32_t ff_mirror_way(struct ff_thread *t, const struct ff_mirror *mirror, size
 		ff_normal(j, locate(&j->locator, hit.triangle, (float)hit.w[1], (float)hit.w[2]),
 		          hit.side, n);
 		ff_hit_point(j, &hit, x);
-		if (j->m->surface.material[surface] == mirror->material && hit.side == mirror->side &&
-		    on_mirror(j->m, mirror, n, x))
+		if (mirror_has(&j->images.mirrors, mirror, j->m->surface.material[surface], hit.side,
+		               n, x))
 			break;
 		if (!pass(t, &hit, &w))
 			return CHAIN_NONE;

@@ -7,11 +7,14 @@
 #include "ff_tally.h"
 #include "hemicube.h"
 #include "locate.h"
+#include "mirror.h"
 #include "ray.h"
 #include "rng.h"
 
-/* FF_CLOSE_RAYS: a power of two that an element close to an emitter casts. */
-enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048 };
+/* FF_CLOSE_RAYS: a power of two that an element close to an emitter casts.
+ * FF_HALVINGS: the most of a row's rays. */
+enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048,
+       FF_HALVINGS = 3 };
 
 /* An element as a place to send rays from. Points are corner + w1 edge[0] + w2 edge[1],
  * with weights that keep a little clear of the edges. Threes are padded to four. */
@@ -22,6 +25,7 @@ struct ff_element {
 	double per_area;
 	uint32_t before;          /* 2^32 times the part of the patch's area before it */
 	float per_part;           /* 1 / the same of its own area */
+	double size;              /* root of its area, or how far its corners are from its centre */
 };
 
 /* The first points of the Sobol sequence, in an order in which neighbours have similar
@@ -46,13 +50,6 @@ struct ff_gather {
 	                             taken as its own */
 };
 
-/* A plane of ideal mirrors of one material; n points to the side that reflects. */
-struct ff_mirror {
-	double n[3], offset;
-	uint32_t material;
-	int side;
-};
-
 /* Shared, read-only while rows are computed. */
 struct ff_job {
 	const struct model *m;
@@ -70,14 +67,15 @@ struct ff_job {
 	uint8_t *emits;           /* [2P] gives light of its own */
 	uint8_t *is_source;       /* [2P] any light leaves here */
 	uint32_t chain_most;      /* where counts of ideal events of a colour stop */
+	uint32_t lobes;           /* patch-sides that have one */
 	int has_panes, has_ideal; /* any clear pane; any ideal surface */
-	struct ff_mirror *mirror; /* [mirrors] planes with images of lights; none if they are */
-	size_t mirrors;           /* so many that only rays will do */
+	struct light_images images; /* in one mirror each */
 	double small_area;        /* elements below gather with a quarter of the rays: what they
 	                             lack weighs little */
 	struct ff_samples of_rows, of_gathering, of_small;
 	struct tally_places places;
 	struct ff_gather gather;
+	uint8_t *halvings;        /* [2P] how often the rays of a row are halved; NULL: never */
 	struct ff_formula formula;
 };
 
@@ -130,12 +128,36 @@ struct ff_thread {
 	struct vec chain_map;     /* local -> whole */
 };
 
+static inline int ff_by_formula(const struct ff_options *o)
+{
+	return o->method == FF_ANALYTIC || o->method == FF_AUTO;
+}
+
+/* What a job needs whatever it makes. O(elements + triangles log triangles). 0, or -1 and e;
+ * either way free it. */
+int ff_job_init(struct ff_job *j, const struct model *m, const struct ff_options *o,
+                struct err *e);
+void ff_job_free(struct ff_job *j);
+
+/* What rows that are computed one by one, of patches or of lights alone, need beside. */
+int ff_job_prepare(struct ff_job *j, int patches, struct err *e);
+
+/* Fills job->of_rows, of_gathering, of_small. O(points log points). 0, or -1 and e. */
+int ff_points(struct ff_job *j, struct err *e);
+
+int ff_thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e);
+void ff_thread_free(struct ff_thread *t);
+
 /* Sets job->chain_most: as high as keeps chains few, by what a few rays meet. O(depth)
  * rays. 0, or -1 and e. */
 int ff_find_chain_most(struct ff_job *j, struct err *e);
 
 /* Fills job->element. O(elements). */
 void ff_element_table(struct ff_job *j);
+
+/* The element of a patch that a number in [0,1) chooses by area; what is left of the
+ * number, again uniform, replaces it. */
+uint32_t ff_choose(const struct ff_job *j, uint32_t patch, double *u);
 
 /* A point on a patch, uniform by area, from two numbers in [0,1): its element and
  * position (on the surface, not moved off it). */
@@ -194,6 +216,20 @@ static inline uint32_t ff_gather_rays(const struct ff_job *j, uint32_t element)
 	return j->m->element_area[element] < j->small_area ? j->o.gather / 4 : j->o.gather;
 }
 
+/* Rays that a patch-side's diffuse row casts, if any. */
+static inline uint32_t ff_row_rays(const struct ff_job *j, uint32_t ps)
+{
+	return j->emits[ps] ? j->o.rays * j->o.emitter_gain
+	                    : j->o.rays >> (j->halvings ? j->halvings[ps] : 0);
+}
+
+/* How often the rays of a row can be halved so that each replicate is a whole number. */
+int ff_most_halvings(uint32_t rays);
+
+/* Sets job->halvings by what was gathered: rows that carry less light than others cast fewer
+ * rays. O(pairs seen). 0, or -1 and e. */
+int ff_share_rays(struct ff_job *j, struct err *e);
+
 /* Casts ff_gather_rays rays from every element-side that is modelled and no ideal mirror or
  * pane, jointly stratified over its area and hemisphere, into j->gather; adds to *rays.
  * Memory: 16 bytes for every pair of an element-side and a patch-side that it sees.
@@ -238,24 +274,11 @@ void ff_share_pixels(struct ff_thread *t, uint32_t ps);
 
 int ff_patch_hemicube(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e);
 
-/* Finds job->mirror. O(triangles). 0, or -1 and e. */
-int ff_mirrors(struct ff_job *j, struct err *e);
-
-/* The image of a light in a mirror; its arrays are those of *i. 0 if it has none, being
- * behind or in the plane. */
-struct ff_image {
-	struct lights l;          /* one */
-	double position[3], direction[3], cone[2], cosine[2], unit_flux;
-	uint8_t kind;
-};
-int ff_image(const struct ff_job *j, const struct ff_mirror *mirror, size_t light,
-             struct ff_image *i);
-
 /* The chain of events that a light's rays pass from `to` to `from`: straight and through
  * clear panes; or by way of a mirror, when the ray from `from` towards the image meets it
  * first. CHAIN_NONE if anything else is in their way. */
 uint32_t ff_clear_way(struct ff_thread *t, const double from[3], const double to[3]);
-uint32_t ff_mirror_way(struct ff_thread *t, const struct ff_mirror *mirror, size_t light,
+uint32_t ff_mirror_way(struct ff_thread *t, const struct mirror_plane *mirror, size_t light,
                        const double from[3], const double toward[3]);
 
 /* The row of a punctual light into the batch; none if it has no flux. 0, or -1 and e.

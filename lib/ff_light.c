@@ -31,10 +31,10 @@ struct lit {
 
 /* An element-side looking at a light, or at its image in a mirror. */
 struct look {
-	const struct lights *l;
-	size_t light;
-	const struct ff_mirror *mirror; /* NULL: the light itself */
-	size_t original;        /* of an image */
+	const struct lights *l; /* with their images */
+	size_t light;           /* of these */
+	size_t original;        /* that it is an image of */
+	const struct mirror_plane *mirror; /* NULL: the light itself */
 	uint32_t column;
 	double normal[3];
 	double clear;           /* rays end so far before the light */
@@ -186,22 +186,18 @@ static void light_element(struct ff_thread *t, const struct look *from, uint32_t
 static void light_elements(struct ff_thread *t, size_t light)
 {
 	const struct ff_job *j = t->job;
-	struct look k = { .l = &j->m->light, .light = light, .clear = ray_offset(j->rays),
+	const struct light_images *g = &j->images;
+	struct look k = { .l = &g->l, .clear = ray_offset(j->rays), .original = light,
 	                  .seed = rng_mix(j->o.seed ^ rng_mix(light)) };
-	struct ff_image image;
 
 	t->lit.n = 0;
-	for (uint32_t i = 0; i < j->m->elements; i++)
-		light_element(t, &k, i);
-	for (size_t m = 0; m < j->mirrors; m++) {
-		if (!ff_image(j, &j->mirror[m], light, &image))
+	for (size_t i = 0; i < g->l.n; i++) {
+		if (g->origin[i] != light)
 			continue;
-		k.l = &image.l;
-		k.light = 0;
-		k.mirror = &j->mirror[m];
-		k.original = light;
-		for (uint32_t i = 0; i < j->m->elements; i++)
-			light_element(t, &k, i);
+		k.light = i;
+		k.mirror = g->plane[i] < 0 ? NULL : &g->mirrors.plane[g->plane[i]];
+		for (uint32_t el = 0; el < j->m->elements; el++)
+			light_element(t, &k, el);
 	}
 }
 

@@ -7,7 +7,7 @@
 
 /* Thick: 1e-6 of the scene is far above the rounding of float32 positions and far below
  * an element. Fractions of the element size: what is much smaller than an element does
- * not pay for elements of its own. */
+ * not pay for elements of its own, and a gap much narrower shows in none. */
 static struct imprint_limits limits_of(const struct model *m, double size)
 {
 	double lo[3], hi[3], largest = 0, diagonal = 0;
@@ -19,8 +19,9 @@ static struct imprint_limits limits_of(const struct model *m, double size)
 	}
 	double thick = fmax(1e-6 * diagonal, 0x1p-48 * largest);
 	return (struct imprint_limits){ .size = size * (1 + 1e-8), .thick = thick,
+		                        .close = fmax(size / 8, thick),
 		                        .apart = fmax(1e-3 * size, 2 * thick),
-		                        .shortest = size / 2 };
+		                        .shortest = size / 2, .flush = size / 16 };
 }
 
 int imprint(struct model *m, double size, struct mesher_report *r, struct err *e)
@@ -42,6 +43,8 @@ int imprint(struct model *m, double size, struct mesher_report *r, struct err *e
 		         tear_lines(m, &pieces, &r->lines, e) ? -1 : 0;
 	r->cut = pieces.cut;
 	r->fine_contacts = contacts.fine;
+	if (!status)
+		status = drop_covered(m, &limits, r, e);
 done:
 	edges_free(&g);
 	free(contacts.list.data);

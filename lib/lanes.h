@@ -14,6 +14,7 @@ enum { LANES = 4, CHANNELS_MAX = 384, VECTORS_MAX = CHANNELS_MAX / LANES };
 
 typedef double lanes __attribute__((vector_size(32)));
 typedef float lanes_f32 __attribute__((vector_size(16)));
+typedef long long lanes_mask __attribute__((vector_size(32)));
 
 /* Vectors that hold so many channels. */
 static inline size_t lanes_vectors(size_t channels)
@@ -57,17 +58,36 @@ static inline double lanes_total(const lanes *x, size_t n)
 	return sum[0] + sum[1] + sum[2] + sum[3];
 }
 
-typedef long long lanes_bits __attribute__((vector_size(32)));
-
 static inline lanes lanes_abs(lanes x)
 {
-	return (lanes)((lanes_bits)x & INT64_MAX);
+	return (lanes)((lanes_mask)x & INT64_MAX);
 }
 
 /* x, or 0 where not `yes`, without a branch. */
 static inline lanes lanes_if(lanes x, int yes)
 {
-	return (lanes)((lanes_bits)x & -(long long)yes);
+	return (lanes)((lanes_mask)x & -(long long)yes);
+}
+
+static inline lanes lanes_all(double x)
+{
+	return (lanes){ x, x, x, x };
+}
+
+/* Lanes of a where the mask that a comparison gave is set, else those of b. */
+static inline lanes lanes_choose(lanes_mask mask, lanes a, lanes b)
+{
+	return (lanes)((mask & (lanes_mask)a) | (~mask & (lanes_mask)b));
+}
+
+static inline lanes lanes_min(lanes a, lanes b)
+{
+	return lanes_choose(a < b, a, b);
+}
+
+static inline lanes lanes_max(lanes a, lanes b)
+{
+	return lanes_choose(a > b, a, b);
 }
 
 /* Sum of the absolute values of n vectors. */

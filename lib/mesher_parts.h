@@ -43,14 +43,19 @@ int clean_separate(struct model *m, uint32_t **group, struct err *e);
 /* Removes the triangles with keep[t] = 0 from all triangle arrays. */
 void clean_compact(struct model *m, const uint8_t *keep);
 
-/* position[v] = number of the place of vertex v, the same for vertices of
- * different surfaces that coincide. To be freed; NULL and e on failure. */
+/* position[v] = number of the place of vertex v, the same for vertices of different surfaces
+ * that coincide, to 2^-22 of the scene's diagonal: what float32 positions are off by once
+ * their nodes have moved them. To be freed; NULL and e on failure. */
 uint32_t *clean_positions(const struct model *m, size_t *places, struct err *e);
 
 /* duplicates.c: drops triangles, and pairs that make up the same plane quad,
  * which coincide with ones of lower index. */
 int drop_duplicates(struct model *m, const uint32_t *position, struct mesher_report *r,
                     struct err *e);
+
+/* The side that dropped triangle t showed where the kept one in its place has its back:
+ * twin[kept], as merge_sandwiches() wants it, unless that side is black. */
+void note_twin(const struct model *m, uint32_t t, uint32_t kept, uint64_t *twin);
 
 /* sandwich.c: gives kept triangles of one-sided materials the side that their
  * dropped twin showed where the kept one's black back was. twin[t] = 1 +

@@ -103,9 +103,7 @@ struct pathtrace *pathtrace_new(const struct model *m, const struct ray_scene *r
 	p->light_below = mem_new(m->light.n + 1, sizeof *p->light_below, "lights", e);
 	if (p->normal && p->area && p->density && p->light_below) {
 		planes(p);
-		for (size_t i = 0; i < 2 * m->material.n; i++)
-			p->panes |= bsdf_has_ideal(&m->material, i / 2, (int)(i % 2), 1);
-		if (!list_emitters(p, e))
+		if (!list_emitters(p, e) && !light_ways_new(m, rays, &p->ways, e))
 			return p;
 	}
 	pathtrace_free(p);
@@ -121,6 +119,7 @@ void pathtrace_free(struct pathtrace *p)
 	free(p->density);
 	free(p->emitter);
 	free(p->light_below);
+	light_ways_free(&p->ways);
 	free(p);
 }
 
@@ -134,12 +133,9 @@ int pathtrace_diverges(const struct model *m)
 	return 0;
 }
 
-int pathtrace_misses(const struct model *m)
+int pathtrace_misses(const struct pathtrace *p)
 {
-	for (size_t i = 0; m->light.n && i < 2 * m->material.n; i++)
-		if (bsdf_has_ideal(&m->material, i / 2, (int)(i % 2), 0))
-			return 1;
-	return 0;
+	return p->m->light.n && !p->ways.images.complete;
 }
 
 int pathtrace_meet(const struct pathtrace *p, const double org[3], const double dir[3],

@@ -26,8 +26,9 @@ void pathtrace_free(struct pathtrace *p);
  * weighs 1 / cos theta_o when seen from the eye. */
 int pathtrace_diverges(const struct model *m);
 
-/* 1 if pictures may miss light: there are punctual lights and ideal mirrors. */
-int pathtrace_misses(const struct model *m);
+/* 1 if pictures may miss light: of punctual lights that curved mirrors turn, or plane ones
+ * more often than there are images for (lib/light_way.h). */
+int pathtrace_misses(const struct pathtrace *p);
 
 struct pathtrace_options {
 	long samples;      /* paths a pixel (at least 1), or particles in all (2) */
@@ -43,9 +44,8 @@ struct pathtrace_options {
  * the root mean square of the standard errors of R, G and B over their mean. One
  * sample has no standard error: no such channels, and infinity.
  * Next-event estimation of the area emitters with multiple importance sampling, and of
- * punctual lights, also straight through clear panes; light of these that comes by way of
- * mirrors to where it is scattered is missing (pathtrace_misses); ideal events are
- * followed; Russian roulette after a few bounces. O(pixels samples bounces log triangles). */
+ * punctual lights and their images in plane mirrors, also through clear panes; ideal events
+ * are followed; Russian roulette after a few bounces. O(pixels samples bounces log triangles). */
 int pathtrace_picture(const struct pathtrace *p, const struct view_frame *f,
                       const struct pathtrace_options *o, const struct progress *progress,
                       struct image *picture, double *relative_error, struct err *e);

@@ -11,6 +11,7 @@
 enum {
 	FREE_BOUNCES = 4,   /* before Russian roulette begins */
 	PASSES_MAX = 4096,  /* surfaces in a row that a straight ray may pass */
+	LIGHTS_ALL = 16,    /* lights and images that are all looked at */
 	BATCHES = 8         /* of a pixel's samples, for its standard error */
 };
 
@@ -21,6 +22,7 @@ struct eye_path {
 	                       the camera and mirrors, where no light could be chosen */
 	double distance;    /* from that vertex, through panes */
 	int straight;       /* a camera ray that has been through panes only */
+	int sharp;          /* or also by mirrors */
 };
 
 /* The next surface. Backs of one-sided materials let camera rays pass. */
@@ -64,33 +66,6 @@ static void add_emission(const struct pathtrace *p, const struct eye_path *path,
 		radiance[b] += path->throughput[b] * weight * l[b];
 }
 
-/* Multiplies value[bands] by what clear panes between a and b let through of the
- * light from b to a. 0 if it is nothing. */
-static int light_through(const struct pathtrace *p, const double a[3], const double b[3],
-                         double *value)
-{
-	double org[3] = { a[0], a[1], a[2] }, dir[3], left;
-
-	if (!ray_blocked(p->rays, a, b))
-		return 1;
-	if (!p->panes)
-		return 0;
-	for (int i = 0; i < PASSES_MAX; i++) {
-		struct vertex v;
-		v3_sub(b, org, dir);
-		left = v3_normalise(dir);
-		if (!pathtrace_meet(p, org, dir, &v) || v.t >= left)
-			return 1;
-		if (!bsdf_has_ideal(&p->m->material, v.material, !v.side, 1))
-			return 0;
-		size_t at = material_at(&p->m->material, v.material, !v.side);
-		for (int k = 0; k < p->m->bands; k++)
-			value[k] *= p->m->material.tau_s[at + (size_t)k];
-		pathtrace_leave(p, v.n, v.x, dir, org);
-	}
-	return 0;
-}
-
 /* Next-event estimation: light of a chosen point of an emitter. */
 static void add_direct(const struct pathtrace *p, const struct eye_path *path,
                        const struct vertex *v, const double u[3], double *radiance)
@@ -99,6 +74,7 @@ static void add_direct(const struct pathtrace *p, const struct eye_path *path,
 	double y[3], wi[3], from[3], to[3], f[BANDS_MAX], l[BANDS_MAX], any = 0;
 	double wo[3] = { -path->dir[0], -path->dir[1], -path->dir[2] };
 	const struct emitter *at = pathtrace_emitter(p, u, y);
+	uint64_t rays = 0;
 	const double *n = &p->normal[3 * (size_t)at->triangle];
 
 	v3_sub(y, v->x, wi);
@@ -116,7 +92,7 @@ static void add_direct(const struct pathtrace *p, const struct eye_path *path,
 		return;
 	pathtrace_leave(p, v->n, v->x, wi, from);
 	pathtrace_leave(p, n, y, back, to);
-	if (!light_through(p, from, to, f))
+	if (!light_through(&p->ways, from, to, f, &rays))
 		return;
 	double pdf = at->chance / p->area[at->triangle] * distance * distance / fabs(cosine);
 	double other = bsdf_pdf(m, v->material, v->n, wo, BSDF_FROM_EYE, wi);
@@ -125,29 +101,31 @@ static void add_direct(const struct pathtrace *p, const struct eye_path *path,
 		radiance[b] += f[b] * scale;
 }
 
-/* How a vertex sees a light; returns its irradiance, mean of the bands, if nothing is
+/* How a vertex sees a light or image; returns its irradiance, mean of the bands, if nothing is
  * between. */
 static double sight(const struct pathtrace *p, const struct vertex *v, size_t light,
                     struct light_sight *s)
 {
-	const double *intensity = &p->m->light.intensity[light * (size_t)p->m->bands];
+	const struct lights *l = &p->ways.images.l;
+	const double *intensity = &l->intensity[light * (size_t)p->m->bands];
 	double sum = 0;
 
-	light_see(&p->m->light, light, v->x, ray_offset(p->rays), s);
+	light_see(l, light, v->x, ray_offset(p->rays), s);
 	for (int b = 0; b < p->m->bands; b++)
 		sum += intensity[b] / p->m->bands;
 	return sum * s->across * s->falloff * fabs(v3_dot(v->n, s->toward));
 }
 
-/* Adds `times` what a vertex gets of a light. */
+/* Adds `times` what a vertex gets of a light or image. */
 static void add_light(const struct pathtrace *p, const struct eye_path *path,
                       const struct vertex *v, size_t light, double times, double *radiance)
 {
 	const struct model *m = p->m;
-	const double *intensity = &m->light.intensity[light * (size_t)m->bands];
+	const double *intensity = &p->ways.images.l.intensity[light * (size_t)m->bands];
 	double wo[3] = { -path->dir[0], -path->dir[1], -path->dir[2] };
 	double f[BANDS_MAX], from[3], any = 0;
 	struct light_sight s;
+	uint64_t rays = 0;
 
 	sight(p, v, light, &s);
 	bsdf_eval(m, v->material, v->n, s.toward, wo, f);
@@ -159,28 +137,29 @@ static void add_light(const struct pathtrace *p, const struct eye_path *path,
 	if (!(any > 0))
 		return;
 	pathtrace_leave(p, v->n, v->x, s.toward, from);
-	if (!light_through(p, from, s.to, f))
+	if (!light_way(&p->ways, light, from, &s, f, &rays))
 		return;
 	for (int b = 0; b < m->bands; b++)
 		radiance[b] += f[b];
 }
 
-/* Next-event estimation of punctual lights: all for the first vertex, and then one, chosen
- * by its irradiance. */
+/* Next-event estimation of punctual lights and their images: all for points that the camera
+ * sees, also in mirrors, if they are few, else one, chosen by its irradiance. */
 static void add_lights(const struct pathtrace *p, const struct eye_path *path,
-                       const struct vertex *v, int first, double u, double *radiance)
+                       const struct vertex *v, double u, double *radiance)
 {
 	double sum = 0, left, here;
+	size_t n = p->ways.images.l.n, all = path->sharp && n <= LIGHTS_ALL;
 	struct light_sight s;
 
-	for (size_t i = 0; i < p->m->light.n; i++) {
-		if (first)
+	for (size_t i = 0; i < n; i++) {
+		if (all)
 			add_light(p, path, v, i, 1, radiance);
 		else
 			sum += sight(p, v, i, &s);
 	}
 	left = u * sum;
-	for (size_t i = 0; sum > 0 && i < p->m->light.n; i++, left -= here) {
+	for (size_t i = 0; sum > 0 && i < n; i++, left -= here) {
 		here = sight(p, v, i, &s);
 		if (here > 0 && left < here) {
 			add_light(p, path, v, i, sum / here, radiance);
@@ -204,6 +183,7 @@ static int scatter(const struct pathtrace *p, struct eye_path *path, const struc
 		path->throughput[b] *= s.weight[b];
 		any = fmax(any, path->throughput[b]);
 	}
+	path->sharp &= s.pdf == 0;
 	if (s.event != BSDF_IDEAL_T) {
 		path->straight = 0;
 		path->pdf = s.pdf;
@@ -227,7 +207,7 @@ static void follow(const struct pathtrace *p, struct eye_path *path, const doubl
 		if (p->emitters)
 			add_direct(p, path, &v, bounce ? u : light, radiance);
 		if (p->m->light.n)
-			add_lights(p, path, &v, bounce == 0, u[0], radiance);
+			add_lights(p, path, &v, u[0], radiance);
 		if (!scatter(p, path, &v, r))
 			return;
 		if (bounce >= FREE_BOUNCES && !pathtrace_roulette(path->throughput, p->m->bands, r))
@@ -253,7 +233,7 @@ static void sample_pixel(const struct render *j, size_t pixel, long sample, doub
 	struct rng r = rng_seed(j->o->seed, stream);
 	size_t width = (size_t)j->f->width;
 	double light[3];
-	struct eye_path path = { .straight = 1 };
+	struct eye_path path = { .straight = 1, .sharp = 1 };
 
 	for (int b = 0; b < j->p->m->bands; b++)
 		path.throughput[b] = 1;

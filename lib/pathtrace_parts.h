@@ -3,6 +3,7 @@
 #ifndef TWOPASS_PATHTRACE_PARTS_H
 #define TWOPASS_PATHTRACE_PARTS_H
 
+#include "light_way.h"
 #include "pathtrace.h"
 #include "rng.h"
 
@@ -25,7 +26,7 @@ struct pathtrace {
 	double emitted[BANDS_MAX]; /* flux, also of lights */
 	double *light_below;       /* [lights+1] sum of the chances of the lights before, by flux
 	                              among all that emits */
-	int panes;                 /* some material is a clear pane */
+	struct light_ways ways;
 };
 
 /* A surface point as a ray meets it. */

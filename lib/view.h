@@ -34,12 +34,14 @@ enum {
  * solution. */
 enum view_method { VIEW_MESH, VIEW_DIRECT, VIEW_GATHER };
 
+enum { VIEW_LOBE_ENOUGH = -1 };
+
 struct view_options {
 	int samples;       /* a pixel; 1 = its centre, else stratified over it */
 	double relative;   /* sampling of a pixel stops where its standard error is this times
 	                      its radiance, after `samples` at the latest; 0: never */
-	int lobe_samples;  /* of a finite lobe; 0 = one ray in the mirror or
-	                      straight-through direction (the paper) */
+	int lobe_samples;  /* of a finite lobe; 0 = one ray in the mirror or straight-through
+	                      direction (the paper); VIEW_LOBE_ENOUGH: as many as it takes */
 	int depth;         /* directional events followed */
 	double cutoff;     /* tails of less than this part of a pixel are cut */
 	unsigned layers;   /* VIEW_... */
@@ -65,6 +67,10 @@ struct view_scene *view_scene_new(const struct model *m, const struct solution *
                                   const struct ray_scene *rays, enum view_method method,
                                   int threads, struct err *e);
 void view_scene_free(struct view_scene *v);
+
+/* 1 if highlights may be missing: of punctual lights that curved mirrors turn, or plane ones
+ * more often than there are images for (lib/light_way.h). */
+int view_misses(const struct view_scene *v);
 
 /* The mask of a comma-separated list of layers (diffuse, directional, emission, Z,
  * N, element, patch, all) into layers. 0, or -1 with an unknown name. */

@@ -77,6 +77,8 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		cli_usage(c, "a .mesh file and at least one .ff file are needed");
 	if (!r->output)
 		cli_usage(c, "an output is needed: -o FILE.rad");
+	for (int i = optind; i < argc; i++)
+		cli_keep_input(c, r->output, argv[i]);
 	r->mesh = argv[optind];
 	r->ff = argv + optind + 1;
 	r->shards = (size_t)(argc - optind - 1);

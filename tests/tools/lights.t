@@ -55,6 +55,45 @@ prepare solve beam
 prepare trace "$T/beam.rad" -c eye -d direct -o "$T/beam.exr" $V
 check "mixed is as lit so" exrcmp --max-rel 1e-5 "$T/mixed.exr" "$T/beam.exr"
 
+# Particles of a light that grazes the floor arrive: (1, .2, -.01), of 1 lx across it.
+$PYTHON - "$T/low.gltf" "$scenes" <<'END'
+import sys
+sys.path.insert(0, sys.argv[2])
+from gltf_writer import Scene
+
+s = Scene("low")
+floor = s.material("floor", {"rho_d": .5})
+s.rectangle("floor", [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], floor)
+s.light("sun", "directional", direction=(1, .2, -.01), intensity=1)
+s.write(sys.argv[1])
+END
+prepare mesh "$T/low.gltf" -o "$T/low.mesh" -p inf -e inf
+check "particles arrive on what they graze" sh -c "reference --irradiance -q --samples 1000 '$T/low.mesh' |
+	awk -F, 'NR > 1 { h += \$5 * \$6; a += \$5 } END { x = h / a / .0098053; exit !(x > .999 && x < 1.001) }'"
+
+# Images in two mirrors that meet in a corner: highlights alone, no noise.
+$PYTHON - "$T/corner.gltf" "$scenes" <<'END'
+import sys
+sys.path.insert(0, sys.argv[2])
+from gltf_writer import Scene
+
+s = Scene("corner")
+floor = s.material("floor", {"rho_s": .5, "alpha": 30})
+mirror = s.material("mirror", {"rho_s": .9})
+s.rectangle("floor", [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], floor)
+s.rectangle("back", [(-1, 1, 0), (1, 1, 0), (1, 1, 1), (-1, 1, 1)], mirror)
+s.rectangle("left", [(-1, -1, 0), (-1, 1, 0), (-1, 1, 1), (-1, -1, 1)], mirror)
+s.light("bulb", "point", (-.3, .2, .5), intensity=2, colour=(1, .5, .25))
+s.light("sun", "directional", direction=(-1, 1, -2), intensity=.5)
+s.camera("eye", (.2, -1.2, 1), (0, 0, 0), 60, 4 / 3, (0, 0, 1))
+s.write(sys.argv[1])
+END
+prepare solve corner
+prepare trace "$T/corner.rad" -c eye -o "$T/corner.exr" $V --lobe-samples 0
+prepare reference "$T/corner.mesh" -c eye -o "$T/mirrored.exr" -s 32x24 --samples 1 --centre
+check "highlights by mirrors as in the reference" \
+	exrcmp --max-rel 1e-5 "$T/corner.exr" "$T/mirrored.exr"
+
 # What form factors depend on.
 cp "$T/beam.mesh" "$T/dim.mesh"
 cp "$T/a.ff" "$T/dim.ff"

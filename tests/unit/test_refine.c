@@ -173,6 +173,40 @@ static void test_nothing_to_do(void **state)
 	release(&f);
 }
 
+/* Errors that halving cannot take to what is asked for, since there is room for one of it, are
+ * no reason to halve everything else. */
+static void test_out_of_reach(void **state)
+{
+	const double at[3] = { .3, .4, 1 };
+	const struct mesher_refinement one = { how.error, { .08, 0 }, how.elements };
+	const struct mesher_options o = sizes(.25, .125, 0);
+	struct model base, m;
+	struct mesher_report r;
+	struct err e = { 0 };
+	uint32_t *origin;
+	size_t near = 0;
+
+	(void)state;
+	make_cube(&base);
+	r = run(&base, o);
+	mesher_report_free(&r);
+	make_cube(&m);
+	struct solution s = lit(&base);
+	for (size_t i = 0; i < s.element_sides; i++)
+		s.discretisation[i] = s.discretisation_direct[i] = 1e-4;
+	doubt(&base, &s, at, .1);
+	for (size_t i = 0; i < s.element_sides; i++)
+		near += s.discretisation[i] > .1;
+	assert_int_equal(mesher_refine(&m, &o, &base, &s, &one, &origin, &r, &e), 0);
+	assert_int_equal(r.marked, near);
+	assert_true(r.error_expected > one.error);
+	mesher_report_free(&r);
+	free(origin);
+	solution_free(&s);
+	model_free(&base);
+	model_free(&m);
+}
+
 /* A patch next to another wall whose light differs from end to end is halved, though its
  * elements are right; one in the middle of a wall is not. */
 static void test_patches(void **state)
@@ -311,7 +345,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_conforming), cmocka_unit_test(test_elsewhere),
-		cmocka_unit_test(test_nothing_to_do), cmocka_unit_test(test_patches),
+		cmocka_unit_test(test_nothing_to_do), cmocka_unit_test(test_out_of_reach),
+		cmocka_unit_test(test_patches),
 		cmocka_unit_test(test_lobes), cmocka_unit_test(test_changed),
 	};
 

@@ -1,0 +1,132 @@
+#include "light_way.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "bsdf.h"
+#include "vec3.h"
+
+/* Parts of a light that images may leave out. */
+static const double faint = 1e-6;
+
+enum {
+	ORDERS_MOST = 64,  /* mirrors in a way */
+	IMAGES_MOST = 64,
+	PANES_MAX = 4096   /* surfaces in a row that a straight ray may pass */
+};
+
+int light_ways_new(const struct model *m, const struct ray_scene *rays, struct light_ways *w,
+                   struct err *e)
+{
+	w->m = m;
+	w->rays = rays;
+	w->panes = 0;
+	for (size_t i = 0; i < 2 * m->material.n; i++)
+		w->panes |= bsdf_has_ideal(&m->material, i / 2, (int)(i % 2), 1);
+	return light_images_new(m, ray_offset(rays), ORDERS_MOST, IMAGES_MOST, faint, &w->images, e);
+}
+
+void light_ways_free(struct light_ways *w)
+{
+	light_images_free(&w->images);
+}
+
+/* Where a ray meets a surface: front normal and place, which from the corners is closer to
+ * the plane than along the ray. */
+static uint32_t place(const struct light_ways *w, const struct ray_hit *hit, double n[3],
+                      double x[3])
+{
+	const struct model *m = w->m;
+	const uint32_t *c = &m->triangle[3 * (size_t)hit->triangle];
+	const double *corner[3];
+
+	for (int i = 0; i < 3; i++)
+		corner[i] = &m->vertex[3 * (size_t)c[i]];
+	v3_area(corner[0], corner[1], corner[2], n);
+	v3_normalise(n);
+	for (int k = 0; k < 3; k++)
+		x[k] = hit->w[0] * corner[0][k] + hit->w[1] * corner[1][k] +
+		       hit->w[2] * corner[2][k];
+	return m->surface.material[m->triangle_surface[hit->triangle]];
+}
+
+/* Beyond a clear pane at org, met on `side`. 0 if it is none. */
+static int pass(const struct light_ways *w, uint32_t material, int side, const double n[3],
+                double org[3], double *value)
+{
+	const struct materials *mt = &w->m->material;
+	double beyond[3];
+
+	if (!bsdf_has_ideal(mt, material, !side, 1))
+		return 0;
+	for (int b = 0; b < w->m->bands; b++)
+		value[b] *= mt->tau_s[material_at(mt, material, !side) + (size_t)b];
+	for (int k = 0; k < 3; k++)
+		beyond[k] = side == FRONT ? -n[k] : n[k];
+	ray_leave(w->rays, beyond, org);
+	return 1;
+}
+
+int light_through(const struct light_ways *w, const double from[3], const double to[3],
+                  double *value, uint64_t *cast)
+{
+	double org[3] = { from[0], from[1], from[2] }, dir[3], n[3];
+	struct ray_hit hit;
+
+	++*cast;
+	if (!ray_blocked(w->rays, from, to))
+		return 1;
+	for (int i = 0; w->panes && i < PANES_MAX; i++) {
+		v3_sub(to, org, dir);
+		double left = v3_normalise(dir);
+		++*cast;
+		ray_nearest(w->rays, org, dir, &hit);
+		if (hit.triangle == RAY_MISS || hit.t >= left)
+			return 1;
+		uint32_t material = place(w, &hit, n, org);
+		if (!pass(w, material, hit.side, n, org, value))
+			return 0;
+	}
+	return 0;
+}
+
+/* On from org towards an image to its mirror, through panes; org is then just before it. */
+static int to_mirror(const struct light_ways *w, const struct mirror_plane *plane,
+                     const double dir[3], double org[3], double *value, uint64_t *cast)
+{
+	double n[3], up[3];
+	struct ray_hit hit;
+
+	for (int i = 0; i < PANES_MAX; i++) {
+		++*cast;
+		ray_nearest(w->rays, org, dir, &hit);
+		if (hit.triangle == RAY_MISS)
+			return 0;
+		uint32_t material = place(w, &hit, n, org);
+		for (int k = 0; k < 3; k++)
+			up[k] = hit.side == FRONT ? n[k] : -n[k];
+		if (mirror_has(&w->images.mirrors, plane, material, hit.side, up, org)) {
+			ray_leave(w->rays, plane->n, org);
+			return 1;
+		}
+		if (!pass(w, material, hit.side, n, org, value))
+			return 0;
+	}
+	return 0;
+}
+
+int light_way(const struct light_ways *w, size_t image, const double from[3],
+              const struct light_sight *s, double *value, uint64_t *cast)
+{
+	const struct light_images *g = &w->images;
+	double org[3] = { from[0], from[1], from[2] };
+	struct light_sight at = *s;
+
+	while (g->plane[image] >= 0) {
+		if (!to_mirror(w, &g->mirrors.plane[g->plane[image]], at.toward, org, value, cast))
+			return 0;
+		image = g->parent[image];
+		light_see(&g->l, image, org, ray_offset(w->rays), &at);
+	}
+	return light_through(w, org, at.to, value, cast);
+}
