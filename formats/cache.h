@@ -11,10 +11,10 @@
 
 /* Part of the key of each stage's output. To be raised whenever a stage makes something
  * else of the same input and options, so that what older programs left is made anew. */
-#define REVISION_MESH "5"
-#define REVISION_FF "9"
-#define REVISION_RAD "11"
-#define REVISION_VIEW "6"
+#define REVISION_MESH "6"
+#define REVISION_FF "11"
+#define REVISION_RAD "12"
+#define REVISION_VIEW "7"
 
 /* Strings are owned (malloc) and may be NULL. */
 struct cache_info {

@@ -25,6 +25,7 @@ struct cut {
 	uint32_t plane;           /* the lowest of these triangles */
 	int flush;                /* 1: it is the border of triangles in that same plane, so
 	                             that only inside the other one something changes */
+	double shortest;          /* a shorter one is left out */
 	double end[2][3];
 	double along[2];          /* of the ends, on the common line of both planes */
 };
@@ -131,10 +132,10 @@ static int clip(const struct search *s, uint32_t a, double end[2][3], int *rim)
 
 /* Notes that triangle b meets the plane of triangle a between p and q. */
 static int add_cut(struct search *s, uint32_t a, uint32_t b, const double p[3],
-                   const double q[3], int flush)
+                   const double q[3], int flush, double shortest)
 {
 	const double *given[2] = { p, q }, *n = s->normal[a];
-	struct cut c = { .plane = sets_find(s->plane, b), .flush = flush };
+	struct cut c = { .plane = sets_find(s->plane, b), .flush = flush, .shortest = shortest };
 	double d[3];
 
 	for (int i = 0; i < 2; i++) {
@@ -161,7 +162,7 @@ static int add_crossing(struct search *s, uint32_t a, uint32_t b, const double h
 			v3_mad(p, height[k] / (height[k] - height[next]), d, end[n++]);
 		}
 	}
-	return n == 2 ? add_cut(s, a, b, end[0], end[1], 0) : 0;
+	return n == 2 ? add_cut(s, a, b, end[0], end[1], 0, s->limits->shortest) : 0;
 }
 
 /* Triangle b stays on one side of the plane of a: what little light comes through between
@@ -177,7 +178,8 @@ static int add_close(struct search *s, uint32_t a, uint32_t b, const double heig
 		if (fabs(height[k]) <= s->limits->close &&
 		    fabs(height[(k + 1) % 3]) <= s->limits->close && coplanar(s, 3 * b + k) == b)
 			status = add_cut(s, a, b, corner(s->m, b, (int)k),
-			                 corner(s->m, b, (int)(k + 1) % 3), close == 3);
+			                 corner(s->m, b, (int)(k + 1) % 3), close == 3,
+			                 s->limits->shortest);
 	return status;
 }
 
@@ -201,7 +203,7 @@ static int add_pair(struct search *s, uint32_t a, uint32_t b)
 		if (height[k] == 0 && height[(k + 1) % 3] == 0 &&
 		    (flat < 3 || coplanar(s, 3 * b + (uint32_t)k) == b))
 			status = add_cut(s, a, b, corner(s->m, b, k), corner(s->m, b, (k + 1) % 3),
-			                 flat == 3);
+			                 flat == 3, flat == 3 ? s->limits->flush : s->limits->shortest);
 	return status;
 }
 
@@ -280,7 +282,7 @@ static int add_contact(struct search *s, uint32_t a, const struct cut *cut)
 		if (cut->flush || s->g->start[edge + 1] - s->g->start[edge] < 2)
 			return 0;
 	}
-	if (v3_length(d) < s->limits->shortest) {
+	if (v3_length(d) < cut->shortest) {
 		s->out->fine++;
 		return 0;
 	}

@@ -199,45 +199,65 @@ void direct_begin(struct direct_worker *w, uint32_t element_side)
 
 /* ---- by formula ---- */
 
-/* Integral of cos^(m-1) cos' dw over a convex polygon seen whole from x, m the emitter's
- * exponent and cos' at x: by cubature over parts that are small for their distance. */
-static double lobe_part(const struct direct_worker *w, const struct emitter *t, const double x[3],
-                        const struct facet *f, int depth)
+/* cos^m; nearly every emitter has m = 1. */
+static double lobe(double cos_theta, double exponent)
 {
-	enum { DEEPEST = 6, ROOM = 36 * (FACET_CORNERS / 2) };
+	return exponent == 1 ? cos_theta : pow(cos_theta, exponent);
+}
+
+/* Angle between a unit vector and any other. */
+static double angle(const double unit[3], const double v[3])
+{
+	double c[3];
+
+	v3_cross(unit, v, c);
+	return atan2(sqrt(v3_dot(c, c)), v3_dot(unit, v));
+}
+
+/* Integral of cos^(m-1) weight dw over a convex polygon seen whole from x, m the emitter's
+ * exponent: by cubature over parts that are small for their distance, and for what the
+ * weight varies over. */
+static double weighted_part(const struct emitter *t, const double x[3], const struct facet *f,
+                            const struct direct_weight *weight, int depth)
+{
+	enum { DEEPEST = 24, ROOM = 36 * (FACET_CORNERS / 2) };
 	struct facet_room quarter[4];
-	double d[3], sum = 0;
+	double d[3], sum = 0, small = fmin(1. / 3, weight->width);
 
 	v3_sub(f->centre, x, d);
-	if (depth < DEEPEST && v3_dot(d, d) < 9 * f->radius * f->radius && facet_quarter(f, quarter)) {
+	double far = sqrt(v3_dot(d, d));
+	if (far > f->radius && angle(weight->axis, d) - asin(f->radius / far) > weight->reach)
+		return 0;
+	/* Close to x, parts are as small as what is near them no longer matters. */
+	if (depth < (far < f->radius ? DEEPEST / 4 : DEEPEST) && small * far < f->radius &&
+	    facet_quarter(f, quarter)) {
 		for (int i = 0; i < 4; i++)
-			sum += lobe_part(w, t, x, &quarter[i].f, depth + 1);
+			sum += weighted_part(t, x, &quarter[i].f, weight, depth + 1);
 		return sum;
 	}
 	double at[4][ROOM];
 	struct cubature p = { 0, at[0], at[1], at[2], at[3] };
-	cubature_fill(f, 2, &p);
+	cubature_fill(f, 1, &p);
 	for (int i = 0; i < p.n; i++) {
 		double y[3] = { p.x[i], p.y[i], p.z[i] };
 		v3_sub(y, x, d);
-		double r2 = v3_dot(d, d), r = sqrt(r2), here = v3_dot(d, w->normal) / r;
-		double there = -v3_dot(d, t->f.normal) / r;
-		if (p.w[i] > 0 && here > 0 && there > 0)
-			sum += p.w[i] * pow(there, t->exponent) * here / r2;
+		double r = v3_normalise(d), there = -v3_dot(d, t->f.normal);
+		if (p.w[i] > 0 && there > 0)
+			sum += p.w[i] * lobe(there, t->exponent) * weight->at(d, weight->arg) / (r * r);
 	}
 	return sum;
 }
 
-struct lobe_eye {
-	const struct direct_worker *w;
+struct weighted_eye {
 	const struct emitter *t;
 	const double *x;
+	const struct direct_weight *weight;
 };
 
 /* The same over a polygon as x sees it: a fan of triangles. */
-static double lobe_polygon(const struct eye_polygon *p, void *arg)
+static double weighted_polygon(const struct eye_polygon *p, void *arg)
 {
-	const struct lobe_eye *o = arg;
+	const struct weighted_eye *o = arg;
 	double sum = 0;
 
 	for (int k = 1; k + 1 < p->n; k++) {
@@ -251,9 +271,51 @@ static double lobe_polygon(const struct eye_polygon *p, void *arg)
 		}
 		facet_measure(&f);
 		if (f.area > 0)
-			sum += lobe_part(o->w, o->t, o->x, &f, 0);
+			sum += weighted_part(o->t, o->x, &f, o->weight, 0);
 	}
 	return sum;
+}
+
+/* NaN and e when memory is short. */
+static double weighted(struct direct_worker *w, const struct outlook *o, const double x[3],
+                       const struct direct_weight *weight, struct err *e)
+{
+	struct weighted_eye eye = { o->emitter, x, weight };
+
+	if (v3_dot(o->emitter->f.normal, x) - o->emitter->f.offset <= 0)
+		return 0;
+	return seen_measured(&w->seer, x, o->f, o->blockers, weighted_polygon, &eye, e);
+}
+
+int direct_weighted(struct direct_worker *w, const double world[3],
+                    const struct direct_weight *weight, double *h, struct err *e)
+{
+	double x[3];
+
+	v3_sub(world, w->d->centre, x);
+	memset(h, 0, (size_t)w->d->m->bands * sizeof *h);
+	for (size_t i = 0; i < w->outlooks; i++) {
+		double f = weighted(w, &w->outlook[i], x, weight, e);
+		if (isnan(f))
+			return -1;
+		for (int b = 0; b < w->d->m->bands; b++)
+			h[b] += f * w->outlook[i].emitter->radiance[b];
+	}
+	return 0;
+}
+
+int direct_sampled(const struct direct_worker *w)
+{
+	int sampled = !w->d->exact;
+
+	for (size_t i = 0; i < w->outlooks; i++)
+		sampled |= w->outlook[i].sampled;
+	return sampled;
+}
+
+static double cosine(const double dir[3], const void *normal)
+{
+	return fmax(0, v3_dot(dir, normal));
 }
 
 /* Irradiance for unit radiance along the emitter's normal. NaN and e when memory is short. */
@@ -268,17 +330,12 @@ static double exact(struct direct_worker *w, const struct outlook *o, const doub
 		return PI * fmax(0, contour_point(x, w->normal, o->f->n, o->f->v));
 	if (t->exponent == 1)
 		return PI * seen(&w->seer, x, w->normal, o->f, o->blockers, e);
-	struct lobe_eye eye = { w, t, x };
-	return seen_measured(&w->seer, x, o->f, o->blockers, lobe_polygon, &eye, e);
+	struct direct_weight all = { .at = cosine, .arg = w->normal, .width = 1, .reach = PI };
+	memcpy(all.axis, w->normal, sizeof all.axis);
+	return weighted(w, o, x, &all, e);
 }
 
 /* ---- by shadow rays ---- */
-
-/* cos^m; nearly every emitter has m = 1. */
-static double lobe(double cosine, double exponent)
-{
-	return exponent == 1 ? cosine : pow(cosine, exponent);
-}
 
 /* About what an emitter would bring if nothing were hidden: the density that it is chosen
  * with. 0 only if it is behind the plane of x, or x behind its plane. */

@@ -41,6 +41,23 @@ void direct_begin(struct direct_worker *w, uint32_t element_side);
 int direct_at(struct direct_worker *w, const double x[3], uint64_t seed, double relative,
               const double *other, double *h, double *error, struct err *e);
 
+/* A weight of directions: at(unit direction, arg), which is smooth over angles of `width` and
+ * nothing to speak of beyond the angle `reach` from the unit vector `axis`. */
+struct direct_weight {
+	double (*at)(const double dir[3], const void *arg);
+	const void *arg;
+	double axis[3], width, reach;
+};
+
+/* 1 if the side of direct_begin has to sample some emitter. */
+int direct_sampled(const struct direct_worker *w);
+
+/* The radiance that a point of a side that samples none gets straight from emitters,
+ * integrated over directions with a weight, into h[bands]. Punctual lights have none. 0, or
+ * -1 and e when memory is short. O(emitters x bodies between). */
+int direct_weighted(struct direct_worker *w, const double x[3], const struct direct_weight *weight,
+                    double *h, struct err *e);
+
 /* 1 if emitters are few enough to be looked at one by one. */
 int direct_exact(const struct direct *d);
 

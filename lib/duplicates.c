@@ -60,10 +60,8 @@ static void area_vector(const struct model *m, uint32_t t, double n[3])
 	        &m->vertex[3 * (size_t)c[2]], n);
 }
 
-/* Triangle t goes because `kept` fills its place. */
-static void drop(struct search *s, uint32_t t, uint32_t kept)
+void note_twin(const struct model *m, uint32_t t, uint32_t kept, uint64_t *twin)
 {
-	const struct model *m = s->m;
 	uint32_t surface = m->triangle_surface[t];
 	double n[3], o[3];
 
@@ -72,8 +70,16 @@ static void drop(struct search *s, uint32_t t, uint32_t kept)
 	/* The side of t that lies on the back of the kept one. */
 	int side = v3_dot(n, o) < 0 ? FRONT : BACK;
 	int black = side == BACK && m->material.one_sided[m->surface.material[surface]];
-	if (!black && !s->twin[kept])
-		s->twin[kept] = 1 + 2 * (uint64_t)surface + (uint64_t)side;
+	if (!black && !twin[kept])
+		twin[kept] = 1 + 2 * (uint64_t)surface + (uint64_t)side;
+}
+
+/* Triangle t goes because `kept` fills its place. */
+static void drop(struct search *s, uint32_t t, uint32_t kept)
+{
+	uint32_t surface = s->m->triangle_surface[t];
+
+	note_twin(s->m, t, kept, s->twin);
 	s->keep[t] = 0;
 	if (surface < s->r->surfaces)
 		s->r->surface[surface].duplicate++;

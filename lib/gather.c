@@ -33,7 +33,8 @@ struct gather {
 	struct edges edges;
 	unsigned char *wanted;  /* [groups][2] */
 	unsigned char *asked;   /* [2 elements] */
-	float *value, *error;   /* [elements][3 corners][2][bands] irradiance, standard error */
+	float *value, *error;   /* [elements][3 corners][2][bands] irradiance, standard error, and */
+	float *common;          /* what that has of errors of the solution */
 	float *miss;            /* [2 elements][bands] of interpolation */
 	struct gather_table table;
 	struct gather_worker *worker; /* [threads] */
@@ -49,9 +50,10 @@ static int new_arrays(struct gather *g, struct err *e)
 	g->asked = mem_new(n, 2, "gathering", e);
 	g->value = mem_new(6 * n, bands * sizeof *g->value, "gathering", e);
 	g->error = mem_new(6 * n, bands * sizeof *g->error, "gathering", e);
+	g->common = mem_new(6 * n, bands * sizeof *g->common, "gathering", e);
 	g->miss = mem_new(2 * n, bands * sizeof *g->miss, "gathering", e);
 	g->worker = mem_new((size_t)g->o.threads, sizeof *g->worker, "gathering", e);
-	if (!g->wanted || !g->asked || !g->value || !g->error || !g->miss || !g->worker)
+	if (!g->wanted || !g->asked || !g->value || !g->error || !g->common || !g->miss || !g->worker)
 		return -1;
 	for (int t = 0; t < g->o.threads; t++)
 		if (gather_worker_init(&g->worker[t], &g->table, g->v, g->o.depth, e))
@@ -91,6 +93,7 @@ void gather_free(struct gather *g)
 	free(g->asked);
 	free(g->value);
 	free(g->error);
+	free(g->common);
 	free(g->miss);
 	free(g);
 }
@@ -108,7 +111,7 @@ uint64_t gather_rays(const struct gather *g)
 	uint64_t sum = 0;
 
 	for (int t = 0; t < g->o.threads; t++)
-		sum += g->worker[t].rays;
+		sum += g->worker[t].rays + g->worker[t].tails->rays;
 	return sum;
 }
 
@@ -245,7 +248,7 @@ static void gather_group(struct gather *g, struct gather_worker *w, size_t group
 	const uint32_t *corner = &g->groups.corner[g->groups.start[group]];
 	uint32_t n = g->groups.start[group + 1] - g->groups.start[group], of[VALENCE];
 	size_t bands = (size_t)g->v->m->bands;
-	double h[BANDS_MAX], error[BANDS_MAX];
+	struct gathered found;
 
 	for (uint32_t from = 0; from < n; from += VALENCE) {
 		uint32_t some = n - from < VALENCE ? n - from : VALENCE;
@@ -256,12 +259,13 @@ static void gather_group(struct gather *g, struct gather_worker *w, size_t group
 				continue;
 			find_point(g, corner + from, of, some, c, side, &p);
 			gather_point(w, p.x, p.n, rng_mix(2 * corner[from + c] + (uint32_t)side), g->o.rays,
-			             g->o.relative, p.h, h, error);
+			             g->o.relative, p.h, &found);
 			for (uint32_t i = c; i < some; i++)
 				for (size_t b = 0; b < bands && of[i] == c; b++) {
 					size_t at = (2 * (size_t)corner[from + i] + (size_t)side) * bands + b;
-					g->value[at] = (float)fmax(0, h[b] + p.shift[b]);
-					g->error[at] = (float)error[b];
+					g->value[at] = (float)fmax(0, found.h[b] + p.shift[b]);
+					g->error[at] = (float)found.error[b];
+					g->common[at] = (float)found.common[b];
 				}
 		}
 	}
@@ -342,24 +346,25 @@ void gather_corners(struct gather *g, const struct progress *progress)
 /* ---- points ---- */
 
 void gather_at(struct gather *g, uint32_t element_side, const double x[3], const double w[3],
-               uint64_t seed, int thread, double *h, double *error)
+               uint64_t seed, int thread, struct gathered *to)
 {
 	size_t bands = (size_t)g->v->m->bands, element = element_side >> 1, side = element_side & 1;
 	double all[BANDS_MAX], wanted = g->o.relative > 0 ? g->o.relative : usual_miss;
 	int good = 1;
 
+	*to = (struct gathered){ 0 };
 	reconstruction_at(&g->v->all, element, (int)side, w, all);
 	for (size_t b = 0; b < bands; b++) {
-		double miss = (double)g->miss[element_side * bands + b], square = miss * miss;
-		h[b] = 0;
+		double miss = (double)g->miss[element_side * bands + b], square = miss * miss, common = 0;
 		for (size_t k = 0; k < 3; k++) {
 			size_t at = (2 * (3 * element + k) + side) * bands + b;
 			double off = w[k] * (double)g->error[at];
-			h[b] += w[k] * (double)g->value[at];
+			to->h[b] += w[k] * (double)g->value[at];
 			square += off * off;
+			common += w[k] * (double)g->common[at];
 		}
-		h[b] = fmax(0, h[b]);
-		error[b] = sqrt(square);
+		to->h[b] = fmax(0, to->h[b]);
+		to->common[b] = sqrt(square + common * common);
 		good &= miss <= wanted * all[b];
 	}
 	if (good)
@@ -371,5 +376,5 @@ void gather_at(struct gather *g, uint32_t element_side, const double x[3], const
 	ray_leave(g->v->rays, p.n, p.x);
 	int rays = g->o.rays / g->o.samples > FEWEST ? g->o.rays / g->o.samples : FEWEST;
 	gather_point(&g->worker[thread], p.x, p.n, rng_mix(seed), rays,
-	             g->o.relative * sqrt(g->o.samples), all, h, error);
+	             g->o.relative * sqrt(g->o.samples), all, to);
 }

@@ -40,10 +40,17 @@ void gather_want(struct gather *g, uint32_t element_side);
  * not on the number of threads. O(corners x rays x log triangles). */
 void gather_corners(struct gather *g, const struct progress *progress);
 
-/* Indirect irradiance into h[bands] and its standard error into error[bands] at point x
- * (world) of a side that was wanted, whose element's corners have weights w there. */
+/* Irradiance at a point and its standard error: of this point alone, and what it has in
+ * common with points around, of interpolation and of the errors of the solution where rays
+ * meet it. */
+struct gathered {
+	double h[BANDS_MAX], error[BANDS_MAX], common[BANDS_MAX];
+};
+
+/* Indirect irradiance at point x (world) of a side that was wanted, whose element's corners
+ * have weights w there. */
 void gather_at(struct gather *g, uint32_t element_side, const double x[3], const double w[3],
-               uint64_t seed, int thread, double *h, double *error);
+               uint64_t seed, int thread, struct gathered *to);
 
 /* 0, or -1 and e if memory was short. */
 int gather_check(const struct gather *g, struct err *e);

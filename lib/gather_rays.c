@@ -15,6 +15,7 @@ enum {
 	PARTS = 4,              /* of the sequence, that a standard error comes from */
 	FIRST = 64, MOST = 1 << 14, /* rays of a part where an error is aimed at */
 	AT_ONCE = 512,          /* rays that are sorted by direction: eight for each of */
+	ERRORS = 8,             /* of so many rays the error of the solution is asked for */
 	CELLS = 8               /* so many squared cells, exactly, when they are aligned */
 };
 
@@ -170,18 +171,17 @@ int gather_worker_init(struct gather_worker *w, const struct gather_table *t,
                        const struct view_scene *v, int depth, struct err *e)
 {
 	*w = (struct gather_worker){ .t = t };
-	w->o = (struct view_options){ .samples = 1, .lobe_samples = 1, .depth = depth,
-	                              .cutoff = 1e-3, .threads = 1 };
-	w->stack = mem_new(view_stack_size(&w->o), sizeof *w->stack, "ray stacks", e);
-	w->walker = (struct view_walker){ .v = v, .stack = w->stack, .unlit = 1 };
+	w->tails = mem_new(1, sizeof *w->tails, "gathering", e);
 	w->direct = direct_worker_new(v->direct, e);
-	return w->stack && w->direct ? 0 : -1;
+	if (w->tails)
+		w->tails->depth = depth;
+	return w->tails && w->direct ? 0 : -1;
 }
 
 void gather_worker_free(struct gather_worker *w)
 {
 	direct_worker_free(w->direct);
-	free(w->stack);
+	free(w->tails);
 }
 
 /* ---- rays ---- */
@@ -246,59 +246,137 @@ static void aim(double frame[3][3], const float *u0, const float *u1, struct ray
 	}
 }
 
-/* Follows a ray that meets something directional again, from the beginning. */
-static void add_tail(struct gather_worker *w, const double x[3], const struct ray_batch *b, uint32_t i,
-                     uint64_t seed, double *sum)
+void gather_places(const struct gather_table *t, const struct ray_batch *b, uint32_t n,
+                   uint32_t place[RAY_BATCH])
 {
-	struct view_walker *k = &w->walker;
-	struct view_branch branch = { .index = i, .seed = seed };
-	size_t bands = (size_t)k->v->m->bands;
-
-	memset(k->diffuse, 0, bands * sizeof *k->diffuse);
-	memset(k->directional, 0, bands * sizeof *k->directional);
-	memcpy(branch.org, x, sizeof branch.org);
-	for (int j = 0; j < 3; j++)
-		branch.dir[j] = (double)b->dir[j][i];
-	v3_normalise(branch.dir);
-	k->o = &w->o;
-	view_follow(k, &branch);
-	for (size_t j = 0; j < bands; j++)
-		sum[j] += k->diffuse[j] + k->directional[j];
+	/* Many loads from all over the tables at a time take little longer than one. */
+	for (uint32_t i = 0; i < n; i++)
+		if (b->triangle[i] != RAY_MISS) {
+			place[i] = 2 * locate(&t->locator, b->triangle[i], b->w[0][i], b->w[1][i]) + b->side[i];
+			__builtin_prefetch(&t->radiance[3 * (size_t)t->v->m->bands * place[i]]);
+			__builtin_prefetch(&t->kind[place[i]]);
+		}
 }
 
-/* The radiance of a rough side that is met close to x, with its direct light computed; 0 if
- * it is not close. */
-static int close_by(struct gather_worker *w, const double x[3], uint32_t triangle, size_t place,
-                    float w1, float w2, double *sum)
+void gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_t i, uint32_t place,
+                const double *weight, double *sum)
 {
-	const struct view_scene *v = w->t->v;
-	const uint32_t *c = &v->m->triangle[3 * (size_t)triangle];
-	size_t bands = (size_t)v->m->bands;
-	const struct view_side *s =
-		&v->side[2 * model_patch_material(v->m, v->m->element_patch[place / 2]) + place % 2];
-	const float *rest = w->t->rest + 3 * bands * place;
-	static const double nothing[BANDS_MAX];
-	double at[3], d[3], h[BANDS_MAX], error[BANDS_MAX], p = (double)w1, q = (double)w2;
+	size_t bands = (size_t)t->v->m->bands;
+	const float *c = t->radiance + 3 * bands * place;
+	float w1 = b->w[0][i], w2 = b->w[1][i];
+
+	for (size_t k = 0; k < bands; k++) {
+		float l = c[k] + c[bands + k] * w1 + c[2 * bands + k] * w2;
+		sum[k] += l > 0 ? weight[k] * (double)l : 0;
+	}
+}
+
+static void hit_point(const struct model *m, uint32_t triangle, double p, double q, double x[3])
+{
+	const uint32_t *c = &m->triangle[3 * (size_t)triangle];
 
 	for (size_t k = 0; k < 3; k++)
-		at[k] = (1 - p - q) * v->m->vertex[3 * (size_t)c[0] + k] +
-		        p * v->m->vertex[3 * (size_t)c[1] + k] + q * v->m->vertex[3 * (size_t)c[2] + k];
-	v3_sub(at, x, d);
-	if (v3_dot(d, d) > CLOSE * CLOSE * v->m->element_area[place / 2])
-		return 0;
+		x[k] = (1 - p - q) * m->vertex[3 * (size_t)c[0] + k] +
+		       p * m->vertex[3 * (size_t)c[1] + k] + q * m->vertex[3 * (size_t)c[2] + k];
+}
+
+/* Has the direct light computed where ray i of a batch met something, at y. */
+static void put_close(struct gather_worker *w, const struct ray_batch *b, uint32_t i, size_t place,
+                      const double y[3], double *sum)
+{
+	struct gather_close *to = &w->close[w->closes];
+
+	to->place = place;
+	to->turn = w->closes++;
+	to->sum = sum;
+	to->w[0] = (double)b->w[0][i];
+	to->w[1] = (double)b->w[1][i];
+	memcpy(to->x, y, sizeof to->x);
+}
+
+/* Adds the radiance of a point with its direct light computed. */
+static void add_close(struct gather_worker *w, const struct gather_close *p)
+{
+	static const double middle[3] = { 1. / 3, 1. / 3, 1. / 3 };
+	const struct view_scene *v = w->t->v;
+	size_t bands = (size_t)v->m->bands;
+	const struct view_side *s =
+		&v->side[2 * model_patch_material(v->m, v->m->element_patch[p->place / 2]) + p->place % 2];
+	const float *rest = w->t->rest + 3 * bands * p->place;
+	double h[BANDS_MAX], error[BANDS_MAX], usual[BANDS_MAX];
+
 	for (size_t b = 0; b < bands; b++)
-		sum[b] += fmax(0, (double)rest[b] + (double)rest[bands + b] * p + (double)rest[2 * bands + b] * q);
-	for (int side = 0; side < 2; side++) {
-		const double *part = side ? s->across : s->here;
-		if (!(side ? s->translucent : s->diffuse))
+		p->sum[b] += fmax(0, (double)rest[b] + (double)rest[bands + b] * p->w[0] +
+		                     (double)rest[2 * bands + b] * p->w[1]);
+	for (int across = 0; across < 2; across++) {
+		const double *part = across ? s->across : s->here;
+		int side = (int)(p->place % 2) ^ across;
+		if (!(across ? s->translucent : s->diffuse))
 			continue;
-		direct_begin(w->direct, (uint32_t)place ^ (uint32_t)side);
-		if (direct_at(w->direct, at, place, ROUGHLY, nothing, h, error, &w->e))
-			return 1;
+		direct_begin(w->direct, (uint32_t)(p->place / 2 * 2) + (uint32_t)side);
+		reconstruction_at(&v->all, p->place / 2, side, middle, usual);
+		if (direct_at(w->direct, p->x, p->place, ROUGHLY, usual, h, error, &w->e))
+			return;
 		for (size_t b = 0; b < bands; b++)
-			sum[b] += part[b] * h[b];
+			p->sum[b] += part[b] * h[b];
 	}
-	return 1;
+}
+
+static int by_place(const void *x, const void *y)
+{
+	const struct gather_close *a = x, *b = y;
+
+	return a->place != b->place ? (a->place > b->place) - (a->place < b->place)
+	                            : (a->turn > b->turn) - (a->turn < b->turn);
+}
+
+/* Adds what is close, side by side: points of one share what is between it and emitters. */
+static void add_closes(struct gather_worker *w)
+{
+	qsort(w->close, w->closes, sizeof *w->close, by_place);
+	for (uint32_t i = 0; i < w->closes && !w->e.set; i++)
+		add_close(w, &w->close[i]);
+	w->closes = 0;
+}
+
+/* Adds what errs in the radiance of what ray i of a batch met, at a distance d of x. */
+static void add_blur(struct gather_worker *w, const double d[3], uint32_t place, int computed)
+{
+	const struct view_scene *v = w->t->v;
+	const struct model *m = v->m;
+	size_t bands = (size_t)m->bands, e = place / 2;
+	const struct view_side *s = &v->side[2 * model_patch_material(m, m->element_patch[e]) + place % 2];
+	double square = v3_dot(d, d);
+	double part = fabs(v3_dot(d, w->normal) * v3_dot(d, &m->element_normal[3 * e])) * m->element_area[e] /
+	              (pi * square * square);
+
+	for (size_t k = 0; k < bands; k++)
+		w->blur[k] +=
+			s->here[k] * s->here[k] * view_blurred(v, place * bands + k, part, computed) +
+			s->across[k] * s->across[k] * view_blurred(v, (place ^ 1) * bands + k, part, computed);
+}
+
+/* Follows ray i of a batch beyond what it met. */
+static void go_on(struct gather_worker *w, const double x[3], const struct ray_batch *b, uint32_t i,
+                  uint32_t place, const struct gather_going *begun, double *sum)
+{
+	const struct gather_table *t = w->t;
+	int tail = t->kind[place] & GATHER_TAIL, close = t->kind[place] & GATHER_ROUGH && !tail;
+	double y[3], d[3];
+
+	if (close || i % ERRORS == 0) {
+		hit_point(t->v->m, b->triangle[i], (double)b->w[0][i], (double)b->w[1][i], y);
+		v3_sub(y, x, d);
+		close = close && v3_dot(d, d) < CLOSE * CLOSE * t->v->m->element_area[place / 2];
+	}
+	if (i % ERRORS == 0)
+		add_blur(w, d, place, close);
+	if (tail)
+		gather_go_on(w->tails, t, b, i, place, begun);
+	if (close)
+		put_close(w, b, i, place, y, sum);
+	else
+		gather_add(t, b, i, place, begun->weight, sum);
 }
 
 /* Adds the radiance that the rays of a batch find. */
@@ -307,24 +385,24 @@ static void add_batch(struct gather_worker *w, const double x[3], struct ray_bat
 {
 	const struct gather_table *t = w->t;
 	size_t bands = (size_t)t->v->m->bands;
+	struct gather_going begun = { .depth = 0 };
+	uint32_t place[RAY_BATCH];
 
+	for (size_t k = 0; k < bands; k++)
+		begun.weight[k] = 1;
+	if (w->closes + n > GATHER_CLOSES)
+		add_closes(w);
 	ray_nearest_batch(t->v->rays, b, n);
+	gather_places(t, b, n, place);
 	w->rays += n;
 	for (uint32_t i = 0; i < n; i++) {
+		w->blurs += i % ERRORS == 0;
 		if (b->triangle[i] == RAY_MISS)
 			continue;
-		float w1 = b->w[0][i], w2 = b->w[1][i];
-		size_t place = 2 * (size_t)locate(&t->locator, b->triangle[i], w1, w2) + b->side[i];
-		const float *c = t->radiance + 3 * bands * place;
-		if (t->kind[place] & GATHER_TAIL)
-			add_tail(w, x, b, i, seed, sum);
-		else if (!(t->kind[place] & GATHER_ROUGH) ||
-		         !close_by(w, x, b->triangle[i], place, w1, w2, sum))
-			for (size_t k = 0; k < bands; k++) {
-				float l = c[k] + c[bands + k] * w1 + c[2 * bands + k] * w2;
-				sum[k] += l > 0 ? (double)l : 0;
-			}
+		begun.random = rng_seed(seed, i);
+		go_on(w, x, b, i, place[i], &begun, sum);
 	}
+	gather_follow(w->tails, t, RAY_BATCH - 1, sum);
 }
 
 /* Adds the radiance that points [first, first + n) of a scramble find. */
@@ -348,6 +426,7 @@ static void add_rays(struct gather_worker *w, const double x[3], double frame[3]
 			          rng_mix(seed + first + at + i), sum);
 		}
 	}
+	gather_follow(w->tails, w->t, 0, sum);
 }
 
 /* Irradiance from the sums of parts of `rays` rays each, and its standard error. 1 if that
@@ -371,17 +450,21 @@ static int settled(double part[PARTS][BANDS_MAX], int bands, double rays, double
 }
 
 void gather_point(struct gather_worker *w, const double x[3], const double n[3], uint64_t seed,
-                  int rays, double relative, const double *scale, double *h, double *error)
+                  int rays, double relative, const double *scale, struct gathered *to)
 {
 	double part[PARTS][BANDS_MAX] = { { 0 } }, frame[3][3];
 	int bands = w->t->v->m->bands;
 	uint32_t each = relative > 0 ? FIRST : (uint32_t)(rays + PARTS - 1) / PARTS;
 
+	memset(w->blur, 0, sizeof w->blur);
+	w->blurs = 0;
+	memcpy(w->normal, n, sizeof w->normal);
 	v3_frame(n, frame[0], frame[1]);
 	memcpy(frame[2], n, sizeof frame[2]);
 	for (uint32_t p = 0; p < PARTS; p++)
 		add_rays(w, x, frame, seed, p * each, each, part[p]);
-	while (!settled(part, bands, each, relative, scale, h, error) && relative > 0 && each < MOST) {
+	add_closes(w);
+	while (!settled(part, bands, each, relative, scale, to->h, to->error) && relative > 0 && each < MOST) {
 		/* As many again: the parts so far are half as many, twice as long. */
 		each *= 2;
 		for (int b = 0; b < bands; b++) {
@@ -391,5 +474,8 @@ void gather_point(struct gather_worker *w, const double x[3], const double n[3],
 		}
 		for (uint32_t p = 2; p < PARTS; p++)
 			add_rays(w, x, frame, seed, p * each, each, part[p]);
+		add_closes(w);
 	}
+	for (int b = 0; b < bands; b++)
+		to->common[b] = pi * sqrt(w->blur[b] / w->blurs);
 }

@@ -2,6 +2,8 @@
 #ifndef TWOPASS_GATHER_RAYS_H
 #define TWOPASS_GATHER_RAYS_H
 
+#include "gather.h"
+#include "gather_tail.h"
 #include "locate.h"
 #include "view_path.h"
 
@@ -21,12 +23,25 @@ struct gather_table {
  * tell: it is computed where rays meet such a side close by. */
 enum { GATHER_TAIL = 1, GATHER_ROUGH = 2 };
 
+/* A point close to the one in work where direct light is computed. */
+struct gather_close {
+	size_t place;               /* element-side */
+	uint32_t turn;              /* in which it was met */
+	double x[3], w[2];          /* world; weights of corners 1 and 2 of its triangle */
+	double *sum;                /* that its radiance goes into */
+};
+
+enum { GATHER_CLOSES = 2048 };
+
 /* One thread's. */
 struct gather_worker {
 	const struct gather_table *t;
-	struct view_walker walker;  /* for tails */
-	struct view_options o;
-	struct view_branch *stack;
+	struct gather_tails *tails;
+	struct gather_close close[GATHER_CLOSES];
+	uint32_t closes;
+	double normal[3];           /* of the point in work */
+	double blur[BANDS_MAX];     /* variance of the radiance that the solution has found wrong, */
+	double blurs;               /* summed over so many rays */
 	struct direct_worker *direct;
 	struct err e;
 	uint64_t rays;
@@ -41,10 +56,18 @@ int gather_worker_init(struct gather_worker *w, const struct gather_table *t,
                        const struct view_scene *v, int depth, struct err *e);
 void gather_worker_free(struct gather_worker *w);
 
+/* The element-sides that the first n rays of a batch met, those of misses apart. */
+void gather_places(const struct gather_table *t, const struct ray_batch *b, uint32_t n,
+                   uint32_t place[RAY_BATCH]);
+
+/* Adds weight[bands] times the radiance M / pi of what ray i of a batch met. */
+void gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_t i, uint32_t place,
+                const double *weight, double *sum);
+
 /* Indirect irradiance at a point that has left its surface, whose side has unit normal n:
  * pi times the mean radiance of `rays` rays by the cosine; with relative > 0 as many as it
  * takes for a standard error of that times scale[bands]. */
 void gather_point(struct gather_worker *w, const double x[3], const double n[3], uint64_t seed,
-                  int rays, double relative, const double *scale, double *h, double *error);
+                  int rays, double relative, const double *scale, struct gathered *to);
 
 #endif

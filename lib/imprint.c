@@ -21,7 +21,7 @@ static struct imprint_limits limits_of(const struct model *m, double size)
 	return (struct imprint_limits){ .size = size * (1 + 1e-8), .thick = thick,
 		                        .close = fmax(size / 8, thick),
 		                        .apart = fmax(1e-3 * size, 2 * thick),
-		                        .shortest = size / 2 };
+		                        .shortest = size / 2, .flush = size / 16 };
 }
 
 int imprint(struct model *m, double size, struct mesher_report *r, struct err *e)
@@ -43,6 +43,8 @@ int imprint(struct model *m, double size, struct mesher_report *r, struct err *e
 		         tear_lines(m, &pieces, &r->lines, e) ? -1 : 0;
 	r->cut = pieces.cut;
 	r->fine_contacts = contacts.fine;
+	if (!status)
+		status = drop_covered(m, &limits, r, e);
 done:
 	edges_free(&g);
 	free(contacts.list.data);

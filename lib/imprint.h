@@ -6,6 +6,7 @@
 
 #include "edges.h"
 #include "mem.h"
+#include "mesher.h"
 #include "model.h"
 
 struct imprint_limits {
@@ -15,6 +16,7 @@ struct imprint_limits {
 	                     comes between that elements show none of it, m */
 	double apart;     /* points of a cut this close are one, m */
 	double shortest;  /* contacts along shorter pieces of the other triangle are left out, m */
+	double flush;     /* the same of the border of one that lies in the same plane, m */
 };
 
 /* A segment in the plane of a triangle, within the triangle. */
@@ -64,5 +66,10 @@ int cut_triangles(const struct model *m, const struct edges *g, const struct con
  * along lines, so that nothing that follows shared edges or vertices crosses them.
  * *lines = edges of pieces along lines. 0, or -1 and e. O(n log n). */
 int tear_lines(struct model *m, struct pieces *p, size_t *lines, struct err *e);
+
+/* covered.c: drops triangles that an opaque, smaller surface covers in their plane, and counts
+ * them in the report. O(n log n + candidates). 0, or -1 and e. */
+int drop_covered(struct model *m, const struct imprint_limits *limits,
+                 struct mesher_report *r, struct err *e);
 
 #endif

@@ -130,8 +130,9 @@ static void sphere_ray(const struct lights *l, size_t light, const double u[3], 
 		dir[k] = c * axis[k] + s * (cos(2 * pi * u[1]) * t[k] + sin(2 * pi * u[1]) * b[k]);
 }
 
-/* From a point of the box's faces that the light meets first, each as often as the light
- * sees of it. */
+/* Through a point of the box's faces that the light meets first, each as often as the light
+ * sees of it; from so far away that rays do not take a face which they graze for one that
+ * they leave. */
 static void box_ray(const struct lights *l, size_t light, const double u[3], double clear,
                     double org[3])
 {
@@ -146,7 +147,7 @@ static void box_ray(const struct lights *l, size_t light, const double u[3], dou
 		double x = k == face ? direction[k] < 0 : u[k == (face + 1) % 3 ? 1 : 2];
 		org[k] = l->box[0][k] + x * (l->box[1][k] - l->box[0][k]);
 	}
-	v3_mad(org, -64 * clear, direction, org);
+	v3_mad(org, -(diagonal(l) + clear), direction, org);
 }
 
 void light_ray(const struct lights *l, size_t light, const double u[3], double clear,

@@ -107,8 +107,10 @@ static size_t find_group(const struct solution *s, const char *text)
 static int unknown(const struct solution *s, const char *text, struct err *e)
 {
 	char names[256] = "";
-	size_t n = 0;
+	size_t n = 0, length = strcspn(text, "=,");
 
+	if (text[length] != '=')
+		return err_set(e, "'%.*s' is not NAME=X", (int)length, text);
 	for (size_t g = 0; g < s->groups && n < sizeof names; g++)
 		n += (size_t)snprintf(names + n, sizeof names - n, "%s%s", g ? ", " : "",
 		                      s->group_name[g]);
@@ -116,9 +118,8 @@ static int unknown(const struct solution *s, const char *text, struct err *e)
 		strcpy(names + sizeof names - 4, "...");
 	if (s->groups == 1 && strcmp(s->group_name[0], LIGHT_GROUP_ALL) == 0)
 		return err_set(e, "no light group '%.*s'; solve with shoot --light-groups (there "
-		               "is only %s)", (int)strcspn(text, "=,"), text, names);
-	return err_set(e, "no light group '%.*s'; there are: %s", (int)strcspn(text, "=,"), text,
-	               names);
+		               "is only %s)", (int)length, text, names);
+	return err_set(e, "no light group '%.*s'; there are: %s", (int)length, text, names);
 }
 
 /* One factor or one for each band. Returns what follows them, or NULL and e. */

@@ -55,6 +55,7 @@ struct mesher_report {
 	size_t cut;                      /* triangles cut where others touch them, */
 	size_t lines;                    /* along how many new edges */
 	size_t fine_contacts;            /* contacts too short to be worth a cut */
+	size_t covered;                  /* triangles and parts dropped under coplanar surfaces */
 
 	double diagonal;                 /* of the scene's bounding box, m */
 	double patch_size, element_size; /* m, or INFINITY */

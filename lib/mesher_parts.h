@@ -53,6 +53,10 @@ uint32_t *clean_positions(const struct model *m, size_t *places, struct err *e);
 int drop_duplicates(struct model *m, const uint32_t *position, struct mesher_report *r,
                     struct err *e);
 
+/* The side that dropped triangle t showed where the kept one in its place has its back:
+ * twin[kept], as merge_sandwiches() wants it, unless that side is black. */
+void note_twin(const struct model *m, uint32_t t, uint32_t kept, uint64_t *twin);
+
 /* sandwich.c: gives kept triangles of one-sided materials the side that their
  * dropped twin showed where the kept one's black back was. twin[t] = 1 +
  * 2 (surface of the twin) + side of the twin, or 0. Called before compaction;

@@ -7,27 +7,27 @@
 
 #include "mem.h"
 #include "rng.h"
+#include "view_layers.h"
 #include "view_path.h"
 #include "view_shade.h"
 
 enum {
 	TILE = 16,
 	ROUND = 4,  /* samples of a pixel that are followed before it is looked at again */
-	SUMS = 6    /* arrays of view_sums */
+	SUMS = 7,   /* arrays of view_sums */
+	PROBE = 4   /* of so many pixels squared one has its lobes probed */
 };
 
 /* That shadow rays aim at, relative to the direct light of a pixel, where no error is asked
  * for. */
 static const double usual_error = .1;
 
+/* The same of samples of a lobe. */
+static const double usual_lobe_error = .05;
+
 /* Variance of the mean of n samples that are stratified over a pixel over that of samples
  * which are not, divided by sqrt(n). Measured at edges, with 2 to 16 samples. */
 static const double stratified = .2;
-
-/* Planes of the picture by what they hold; -1 = not asked for. */
-struct planes {
-	int bands, diffuse, directional, emission, z, normal, element, patch, error;
-};
 
 /* What a tile adds to the statistics, kept apart so that sums have one order. */
 struct tile_sum {
@@ -51,7 +51,7 @@ struct render {
 	const struct view_frame *f;
 	const struct view_options *o;
 	struct image *picture;
-	struct planes at;
+	struct view_planes at;
 	double (*spot)[2];          /* [samples] positions in the pixel */
 	struct worker *worker;      /* [threads] */
 	struct gather *gather;
@@ -72,74 +72,6 @@ static struct tile tile_at(const struct render *r, size_t t)
 	tile.wide = right < TILE ? right : TILE;
 	tile.pixels = tile.wide * (down < TILE ? down : TILE);
 	return tile;
-}
-
-/* ---- layers ---- */
-
-int view_parse_layers(const char *list, unsigned *layers)
-{
-	static const char *const name[] = { "diffuse", "directional", "emission", "Z", "N",
-		"element", "patch", "error", "all" };
-	enum { NAMES = sizeof name / sizeof *name };
-	unsigned mask = 0;
-
-	for (const char *p = list;; p++) {
-		size_t n = strcspn(p, ","), i = 0;
-		while (i < NAMES && (strlen(name[i]) != n || strncmp(p, name[i], n) != 0))
-			i++;
-		if (i == NAMES)
-			return -1;
-		mask |= i == NAMES - 1 ? (unsigned)VIEW_ALL : 1u << i;
-		p += n;
-		if (!*p)
-			break;
-	}
-	*layers = mask;
-	return 0;
-}
-
-/* Names of the channels in the order of struct planes. */
-struct names {
-	char text[3 * 5 + 3 + 3 + BANDS_MAX][24];
-	int n;
-};
-
-static int add_names(struct names *s, int asked, const char *prefix, const char *const *suffix,
-                     int count)
-{
-	int first = s->n;
-
-	if (!asked)
-		return -1;
-	for (int i = 0; i < count; i++)
-		snprintf(s->text[s->n++], sizeof *s->text, "%s%s", prefix, suffix[i]);
-	return first;
-}
-
-static int new_picture(struct render *r, struct image *picture, struct err *e)
-{
-	static const char *const rgb[] = { "R", "G", "B" }, *const xyz[] = { "X", "Y", "Z" };
-	static const char *const none[] = { "" };
-	unsigned l = r->o->layers;
-	int bands = r->v->m->bands;
-	struct names s = { .n = 0 };
-	const char *list[sizeof s.text / sizeof *s.text];
-
-	add_names(&s, 1, "", rgb, 3);
-	r->at.bands = bands == 1 || bands == 3 ? -1 : s.n;
-	for (int b = 0; b < bands && r->at.bands >= 0; b++)
-		snprintf(s.text[s.n++], sizeof *s.text, "band.%d", b);
-	r->at.diffuse = add_names(&s, l & VIEW_DIFFUSE, "diffuse.", rgb, 3);
-	r->at.directional = add_names(&s, l & VIEW_DIRECTIONAL, "directional.", rgb, 3);
-	r->at.emission = add_names(&s, l & VIEW_EMISSION, "emission.", rgb, 3);
-	r->at.z = add_names(&s, l & VIEW_Z, "Z", none, 1);
-	r->at.normal = add_names(&s, l & VIEW_N, "N.", xyz, 3);
-	r->at.element = add_names(&s, l & VIEW_ELEMENT, "element", none, 1);
-	r->at.patch = add_names(&s, l & VIEW_PATCH, "patch", none, 1);
-	r->at.error = add_names(&s, l & VIEW_ERROR, "error.", rgb, 3);
-	for (int i = 0; i < s.n; i++)
-		list[i] = s.text[i];
-	return image_new(picture, r->f->width, r->f->height, s.n, list, e);
 }
 
 /* ---- rendering ---- */
@@ -190,6 +122,8 @@ static void follow_sample(const struct render *r, struct view_walker *w, int i, 
 	memset(w->directional, 0, bands * sizeof *w->directional);
 	memset(w->emission, 0, bands * sizeof *w->emission);
 	memset(w->error, 0, bands * sizeof *w->error);
+	memset(w->axial, 0, bands * sizeof *w->axial);
+	w->probing = s == 0 && i % PROBE == PROBE / 2 && j % PROBE == PROBE / 2;
 	camera_ray(r->f, i + r->spot[s][0], j + r->spot[s][1], b.org, b.dir);
 	view_follow(w, &b);
 }
@@ -202,7 +136,14 @@ static void keep_sample(const struct view_walker *w, size_t bands, const struct 
 	memcpy(to->directional + at, w->directional, size);
 	memcpy(to->emission + at, w->emission, size);
 	memcpy(to->error + at, w->error, size);
+	memcpy(to->axial + at, w->axial, size);
 	memset(to->square + at, 0, size);
+}
+
+/* Is there light that is computed, rather than interpolated? */
+static int shades(const struct render *r)
+{
+	return r->v->method != VIEW_MESH || (r->v->lobes && r->o->lobe_samples);
 }
 
 /* Tells what light is needed for a tile. */
@@ -212,7 +153,8 @@ static void ask_tiles(void *arg, size_t begin, size_t end, int thread)
 	struct worker *k = &r->worker[thread];
 
 	for (size_t t = begin; t < end; t++) {
-		struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack, .shader = &k->shader };
+		struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack, .shader = &k->shader,
+			                 .asking = 1 };
 		struct tile tile = tile_at(r, t);
 		for (int p = 0; p < tile.pixels; p++)
 			for (int s = 0; s < r->o->samples; s++)
@@ -233,6 +175,7 @@ static void add_round(const struct view_sums *from, size_t pixel, int samples, s
 			to->emission[sum] += from->emission[at];
 			to->error[sum] += from->error[at];
 			to->square[sum] += from->square[at];
+			to->axial[sum] += from->axial[at];
 			to->spread[sum] += total * total;
 		}
 }
@@ -260,9 +203,11 @@ static int done(const struct render *r, const struct view_sums *sums, size_t pix
 	return r->o->relative > 0;
 }
 
-/* Stores a pixel of the sums over n samples as pixel (i, j) and adds it to the tile's. */
-static void store_pixel(const struct render *r, const struct view_sums *from, size_t pixel, double n,
-                        int i, int j, struct tile_sum *sum)
+/* Stores a pixel of the sums over n samples as pixel (i, j) and adds it to the tile's. w: what
+ * the tile's probes of lobes have found. */
+static void store_pixel(const struct render *r, const struct view_walker *w,
+                        const struct view_sums *from, size_t pixel, double n, int i, int j,
+                        struct tile_sum *sum)
 {
 	size_t id = (size_t)j * (size_t)r->f->width + (size_t)i, bands = (size_t)r->v->m->bands;
 	double *diffuse = from->diffuse + pixel * bands;
@@ -273,6 +218,8 @@ static void store_pixel(const struct render *r, const struct view_sums *from, si
 	for (size_t k = 0; k < bands; k++) {
 		double linear = from->error[pixel * bands + k] / n;
 		double variance = linear * linear + sampling_variance(from, pixel * bands + k, n);
+		if (w->probed[k] > 0)
+			variance += from->axial[pixel * bands + k] / n * fmax(0, w->off[k] / w->probed[k]);
 		diffuse[k] /= n;
 		directional[k] /= n;
 		emission[k] /= n;
@@ -324,7 +271,7 @@ static void trace_round(const struct render *r, struct worker *k, const struct t
 static void trace_tile(const struct render *r, struct worker *k, size_t t)
 {
 	struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack,
-		                 .shader = r->v->method == VIEW_MESH ? NULL : &k->shader };
+		                 .shader = shades(r) ? &k->shader : NULL };
 	struct tile tile = tile_at(r, t);
 	struct tile_sum *sum = &r->tile[t];
 
@@ -335,7 +282,7 @@ static void trace_tile(const struct render *r, struct worker *k, size_t t)
 		trace_round(r, k, &tile, &w, from, to);
 	}
 	for (int p = 0; p < tile.pixels; p++)
-		store_pixel(r, &k->sums, (size_t)p, abs(k->samples[p]), tile.x + p % tile.wide,
+		store_pixel(r, &w, &k->sums, (size_t)p, abs(k->samples[p]), tile.x + p % tile.wide,
 		            tile.y + p / tile.wide, sum);
 	for (int b = 0; b < r->v->m->bands; b++)
 		sum->cut += w.cut[b] / r->o->samples;
@@ -363,7 +310,7 @@ static double radical_inverse(uint32_t i)
 static int new_sums(struct view_sums *s, size_t values, struct err *e)
 {
 	double **array[SUMS] = { &s->diffuse, &s->directional, &s->emission, &s->error, &s->square,
-		                 &s->spread };
+		                 &s->spread, &s->axial };
 	double *room = mem_new(SUMS * values, sizeof *room, "pixels", e);
 
 	for (int i = 0; i < SUMS; i++)
@@ -378,11 +325,12 @@ static int new_worker(const struct render *r, struct worker *k, int thread, stru
 	k->stack = mem_new(view_stack_size(r->o), sizeof *k->stack, "ray stacks", e);
 	if (!k->stack || new_sums(&k->slots, ROUND * values, e) || new_sums(&k->sums, values, e))
 		return -1;
-	if (r->v->method == VIEW_MESH)
+	if (!shades(r))
 		return 0;
-	double relative = r->o->relative > 0 ? r->o->relative / 2
-	                                     : fmin(1, usual_error * sqrt(r->o->samples));
-	return view_shader_init(&k->shader, r->v, r->gather, relative, thread, e);
+	double relative = r->o->relative / 2, usual = sqrt(r->o->samples);
+	return view_shader_init(&k->shader, r->v, r->gather,
+	                        relative > 0 ? relative : fmin(1, usual_error * usual),
+	                        relative > 0 ? relative : fmin(1, usual_lobe_error * usual), thread, e);
 }
 
 static void free_workers(struct render *r)
@@ -475,7 +423,8 @@ int view_render(const struct view_scene *v, const struct view_frame *f,
 	r.across = ((size_t)f->width + TILE - 1) / TILE;
 	tiles = r.across * down;
 	*picture = (struct image){ 0 };
-	if (!new_gather(&r, e) && !new_buffers(&r, tiles, e) && !new_picture(&r, picture, e)) {
+	if (!new_gather(&r, e) && !new_buffers(&r, tiles, e) &&
+	    !view_picture_new(f, o->layers, v->m->bands, &r.at, picture, e)) {
 		if (r.gather)
 			gather(&r, tiles, progress);
 		par_for(tiles, 1, o->threads, trace_tiles, &r, progress);

@@ -34,12 +34,14 @@ enum {
  * solution. */
 enum view_method { VIEW_MESH, VIEW_DIRECT, VIEW_GATHER };
 
+enum { VIEW_LOBE_ENOUGH = -1 };
+
 struct view_options {
 	int samples;       /* a pixel; 1 = its centre, else stratified over it */
 	double relative;   /* sampling of a pixel stops where its standard error is this times
 	                      its radiance, after `samples` at the latest; 0: never */
-	int lobe_samples;  /* of a finite lobe; 0 = one ray in the mirror or
-	                      straight-through direction (the paper) */
+	int lobe_samples;  /* of a finite lobe; 0 = one ray in the mirror or straight-through
+	                      direction (the paper); VIEW_LOBE_ENOUGH: as many as it takes */
 	int depth;         /* directional events followed */
 	double cutoff;     /* tails of less than this part of a pixel are cut */
 	unsigned layers;   /* VIEW_... */

@@ -8,6 +8,7 @@
 #include "rng.h"
 #include "vec3.h"
 #include "view_lights.h"
+#include "view_lobe.h"
 #include "view_shade.h"
 
 /* Backs of one-sided materials in a row that a ray may pass. */
@@ -20,13 +21,13 @@ struct point {
 	double x[3], n[3];  /* n: front normal */
 	double w[3];        /* weights of the element's corners */
 	double cosine;      /* |n.dir| */
+	double way;         /* to it */
 };
 
 size_t view_stack_size(const struct view_options *o)
 {
-	/* Every level leaves at most one branch waiting for each one it goes on with,
-	 * and only one level of a path multiplies its branches. */
-	return 2 * (size_t)o->lobe_samples + 2 * (size_t)o->depth + 4;
+	/* Every level leaves at most one branch waiting for each one it goes on with. */
+	return 2 * (size_t)o->depth + 4;
 }
 
 /* 1 if the ray meets a surface. */
@@ -45,6 +46,7 @@ static int meet(const struct view_scene *v, const double org[3], const double di
 	memcpy(p->n, &m->element_normal[3 * (size_t)p->element], sizeof p->n);
 	memcpy(p->w, hit.w, sizeof p->w);
 	p->cosine = fabs(v3_dot(p->n, dir));
+	p->way = hit.t;
 	return 1;
 }
 
@@ -105,6 +107,44 @@ static void put_request(struct view_walker *w, const struct view_branch *b, stru
 	view_shader_put(w->shader, &q, b->weight);
 }
 
+/* The error of interpolated light that a side shows, off[bands] of it here and across. */
+static void add_error(struct view_walker *w, const struct view_branch *b, const struct point *p)
+{
+	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
+	size_t bands = (size_t)w->v->m->bands, at = (2 * (size_t)p->element + (size_t)p->side) * bands;
+	size_t far = (2 * (size_t)p->element + (size_t)!p->side) * bands;
+
+	if (!b->lobes) {
+		for (size_t i = 0; i < bands; i++)
+			w->error[i] += b->weight[i] * (s->here[i] * (double)w->v->miss[at + i] +
+			                               s->across[i] * (double)w->v->miss[far + i]);
+		return;
+	}
+	/* The part of the lobe that the element fills. */
+	double way = b->reach + p->way;
+	double part = b->density * w->v->m->element_area[p->element] * p->cosine / (way * way);
+	for (size_t i = 0; i < bands; i++)
+		w->blurred[i] += b->weight[i] * b->weight[i] *
+		                 (s->here[i] * s->here[i] * view_blurred(w->v, at + i, part, 0) +
+		                  s->across[i] * s->across[i] * view_blurred(w->v, far + i, part, 0));
+}
+
+/* What counts of an emitter that a sample of a lobe has met: it may be found by aiming, too. */
+static double aimed_share(const struct view_walker *w, const struct view_branch *b,
+                          const struct point *p)
+{
+	const struct view_images *s = &w->v->images;
+
+	if (!b->lobes || b->straight || b->turns < 0 || !(w->aim.sum > 0))
+		return 1;
+	uint32_t emitter = s->of[2 * p->element + (uint32_t)p->side];
+	if (emitter == UINT32_MAX)
+		return 1;
+	double other = view_aim_density(s, &w->aim, (size_t)b->turns * s->emitters.n + emitter,
+	                                b->reach + p->way, p->cosine);
+	return b->density / (b->density + other);
+}
+
 /* Adds what the point itself sends: emission and M / pi. */
 static void add_radiance(struct view_walker *w, const struct view_branch *b, struct point *p)
 {
@@ -112,32 +152,30 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b, str
 	size_t bands = (size_t)w->v->m->bands;
 	double h[BANDS_MAX];
 	double *diffuse = b->depth ? w->directional : w->diffuse;
-	double *emission = b->depth ? w->directional : w->emission;
-	int computed = w->shader && !b->lobes && b->depth <= VIEW_COMPUTED_DEPTH;
+	double *emission = b->straight ? w->lit : b->depth ? w->directional : w->emission;
+	int computed = w->shader && w->v->method != VIEW_MESH && !b->lobes &&
+	               b->depth <= VIEW_COMPUTED_DEPTH;
 	const struct reconstruction *r = computed ? &w->v->part : &w->v->all;
 
 	if (computed && (s->diffuse || s->translucent))
 		put_request(w, b, p);
 	reconstruction_at(r, p->element, p->side, p->w, h);
-	const float *miss = w->v->miss + (2 * (size_t)p->element + (size_t)p->side) * bands;
-	for (size_t i = 0; i < bands; i++) {
+	for (size_t i = 0; i < bands; i++)
 		diffuse[i] += b->weight[i] * s->here[i] * h[i];
-		w->error[i] += b->weight[i] * s->here[i] * (double)miss[i];
-	}
 	if (s->translucent) {
 		reconstruction_at(r, p->element, !p->side, p->w, h);
-		miss = w->v->miss + (2 * (size_t)p->element + (size_t)!p->side) * bands;
-		for (size_t i = 0; i < bands; i++) {
+		for (size_t i = 0; i < bands; i++)
 			diffuse[i] += b->weight[i] * s->across[i] * h[i];
-			w->error[i] += b->weight[i] * s->across[i] * (double)miss[i];
-		}
 	}
-	if (!s->emits || w->unlit)
+	if (s->diffuse || s->translucent)
+		add_error(w, b, p);
+	if (!s->emits)
 		return;
 	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] };
 	bsdf_emission(w->v->m, p->material, p->n, out, h);
+	double share = aimed_share(w, b, p);
 	for (size_t i = 0; i < bands; i++)
-		emission[i] += b->weight[i] * h[i];
+		emission[i] += b->weight[i] * share * h[i];
 }
 
 /* Adds the highlights of punctual lights, which no ray of a lobe can meet. */
@@ -151,11 +189,8 @@ static void add_highlights(struct view_walker *w, const struct view_branch *b,
 		w->directional[i] += b->weight[i] * l[i];
 }
 
-/* Puts a branch that carries `scale` times `coefficient` of b's weight on the
- * stack, or cuts it and books its bound. One of many samples of a lobe is cut by
- * what all of them carry. */
-static void push(struct view_walker *w, const struct view_branch *b,
-                 struct view_branch *next, const double *coefficient, double scale)
+void view_push(struct view_walker *w, const struct view_branch *b, struct view_branch *next,
+               const double *coefficient, double scale)
 {
 	int bands = w->v->m->bands;
 	double most = 0;
@@ -174,42 +209,31 @@ static void push(struct view_walker *w, const struct view_branch *b,
 			w->cut[i] += next->weight[i] * w->v->ceiling[i];
 }
 
-/* N samples of a finite lobe about `axis` on the side with unit normal `normal`.
- * Weights: lib/bsdf's f cos theta_i over the density cos^k gamma / N_k(theta_o)
- * (paper) or (k + 1) cos^k gamma / 2 pi (reciprocal). */
-static void sample_lobe(struct view_walker *w, const struct view_branch *b,
-                        const struct point *p, const struct view_lobe *lobe,
-                        const double axis[3], const double normal[3],
-                        struct view_branch *next)
+/* Follows a finite lobe, by samples or by one ray about its axis. */
+static void branch_into(struct view_walker *w, const struct view_branch *b, const struct point *p,
+                        const struct view_lobe *lobe, int side, struct view_branch *next)
 {
-	int reciprocal = w->v->m->lobe == LOBE_RECIPROCAL, n = 1;
-	double cos_o = fmax(p->cosine, 1e-14);
-	double norm = reciprocal ? 0 : lobe_normaliser(lobe->k, cos_o);
+	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
+	struct view_lobe_seen l = { .k = lobe->k, .cosine = fmax(p->cosine, 1e-14),
+	                            .element = p->element, .side = side, .table = &lobe->table };
+	double scale = w->v->m->lobe == LOBE_RECIPROCAL ? lobe_albedo(lobe->k, p->cosine) : 1;
 
-	if (!b->lobes) {
-		double most = 0;
+	memcpy(l.axis, next->dir, sizeof l.axis);
+	memcpy(l.x, p->x, sizeof l.x);
+	for (int k = 0; k < 3; k++)
+		l.normal[k] = side == FRONT ? p->n[k] : -p->n[k];
+	if (w->o->lobe_samples || b->lobes) {
+		reconstruction_at(&w->v->all, p->element, p->side, p->w, l.other);
 		for (int i = 0; i < w->v->m->bands; i++)
-			most = fmax(most, b->weight[i] * lobe->coefficient[i]);
-		n = (int)fmax(1, fmin(1, most) * w->o->lobe_samples + .5);
+			l.other[i] = b->weight[i] * s->here[i] * l.other[i] + w->directional[i];
+		view_lobe_follow(w, b, &l, lobe->coefficient, next);
+		return;
 	}
-	next->lobes = 1;
-	next->share = b->share / n;
-	for (int i = 0; i < n; i++) {
-		next->index = b->lobes ? b->index
-		                       : b->index * (uint32_t)w->o->lobe_samples + (uint32_t)i;
-		double u[2] = { rng_sobol(next->index, 0, next->seed),
-			rng_sobol(next->index, 1, next->seed) };
-		if (reciprocal)
-			lobe_sample_whole(lobe->k, axis, u, next->dir);
-		else
-			lobe_sample(lobe->k, axis, normal, u, next->dir);
-		double cos_i = v3_dot(normal, next->dir);
-		if (!(cos_i > 0))
-			continue;
-		double weight = reciprocal ? cos_i / fmax(cos_i, cos_o)
-		                           : cos_i / cos_o * norm / lobe_normaliser(lobe->k, cos_i);
-		push(w, b, next, lobe->coefficient, weight / n);
-	}
+	for (int i = 0; i < w->v->m->bands; i++)
+		w->axial[i] += b->weight[i] * b->weight[i] * lobe->coefficient[i] * lobe->coefficient[i];
+	if (w->probing)
+		view_lobe_probe(w, b, &l, lobe->coefficient, scale, next);
+	view_push(w, b, next, lobe->coefficient, scale);
 }
 
 /* Follows one directional part of a point: `through` 0 for reflection into the side
@@ -217,30 +241,51 @@ static void sample_lobe(struct view_walker *w, const struct view_branch *b,
 static void branch_off(struct view_walker *w, const struct view_branch *b,
                        const struct point *p, const struct view_lobe *lobe, int through)
 {
-	struct view_branch next;
-	double axis[3], normal[3], scale = 1;
+	struct view_branch next = { .lobes = b->lobes, .density = b->density, .share = b->share,
+	                            .index = b->index, .reach = b->lobes ? b->reach + p->way : 0,
+	                            .turns = b->turns, .aimed = b->aimed };
 	int side = through ? !p->side : p->side, ideal = isinf(lobe->k);
 
 	if (through)
-		memcpy(axis, b->dir, sizeof axis);
+		memcpy(next.dir, b->dir, sizeof next.dir);
 	else
-		v3_mad(b->dir, -2 * v3_dot(b->dir, p->n), p->n, axis);
-	for (int k = 0; k < 3; k++)
-		normal[k] = side == FRONT ? p->n[k] : -p->n[k];
+		v3_mad(b->dir, -2 * v3_dot(b->dir, p->n), p->n, next.dir);
 	leave(w->v, p, side, next.org);
 	next.passes = through && ideal && b->passes;
-	next.lobes = b->lobes;
-	next.share = b->share;
-	next.index = b->index;
 	next.seed = rng_mix(b->seed + 1 + (uint64_t)through);
-	if (!ideal && w->o->lobe_samples > 0) {
-		sample_lobe(w, b, p, lobe, axis, normal, &next);
-		return;
+	if (b->lobes && !through)
+		next.turns = b->turns == 0 ? 1 + view_images_plane(&w->v->images, p->material, p->side, p->n, p->x)
+		                           : -1;
+	if (b->lobes && (!ideal || (!through && next.turns == 0)))
+		next.turns = -1;
+	if (ideal)
+		view_push(w, b, &next, lobe->coefficient, 1);
+	else if (!w->asking || !w->o->lobe_samples)
+		branch_into(w, b, p, lobe, side, &next);
+}
+
+/* Goes on along the one way that leads to an image; adds its emitter at the end. */
+static void follow_aimed(struct view_walker *w, const struct view_branch *b, struct point *p)
+{
+	const struct view_images *s = &w->v->images;
+	const struct view_side *seen = &w->v->side[2 * p->material + (uint32_t)p->side];
+	size_t image = b->aimed - 1;
+	int plane = (int)(image / s->emitters.n) - 1;
+	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] }, l[BANDS_MAX];
+
+	locate(w->v, p);
+	if (b->turns == 0 && plane >= 0 &&
+	    view_images_plane(s, p->material, p->side, p->n, p->x) == plane) {
+		branch_off(w, b, p, &seen->reflected, 0);
+	} else if (s->of[2 * p->element + (uint32_t)p->side] == image % s->emitters.n) {
+		if (b->straight || b->turns != plane + 1)
+			return;
+		bsdf_emission(w->v->m, p->material, p->n, out, l);
+		for (int i = 0; i < w->v->m->bands; i++)
+			w->directional[i] += b->weight[i] * l[i];
+	} else if (seen->transmitted.coefficient && isinf(seen->transmitted.k)) {
+		branch_off(w, b, p, &seen->transmitted, 1);
 	}
-	if (!ideal && w->v->m->lobe == LOBE_RECIPROCAL)
-		scale = lobe_albedo(lobe->k, p->cosine);
-	memcpy(next.dir, axis, sizeof axis);
-	push(w, b, &next, lobe->coefficient, scale);
 }
 
 static void follow_branch(struct view_walker *w, const struct view_branch *b)
@@ -250,6 +295,10 @@ static void follow_branch(struct view_walker *w, const struct view_branch *b)
 
 	if (!see(v, b->org, b->dir, b->passes, &p, &w->rays))
 		return;
+	if (b->aimed) {
+		follow_aimed(w, b, &p);
+		return;
+	}
 	add_radiance(w, b, &p);
 	const struct view_side *s = &v->side[2 * p.material + (uint32_t)p.side];
 	if (!s->reflected.coefficient && !s->transmitted.coefficient)
@@ -263,18 +312,23 @@ static void follow_branch(struct view_walker *w, const struct view_branch *b)
 		branch_off(w, b, &p, &s->transmitted, 1);
 }
 
+void view_run(struct view_walker *w, size_t below)
+{
+	while (w->waiting > below) {
+		struct view_branch b = w->stack[--w->waiting];
+		follow_branch(w, &b);
+	}
+}
+
 void view_follow(struct view_walker *w, struct view_branch *b)
 {
 	for (int i = 0; i < w->v->m->bands; i++)
 		b->weight[i] = 1;
-	b->depth = b->lobes = 0;
-	b->passes = !w->unlit;
+	b->depth = b->lobes = b->straight = 0;
+	b->passes = 1;
 	b->share = 1;
 	follow_branch(w, b);
-	while (w->waiting) {
-		*b = w->stack[--w->waiting];
-		follow_branch(w, b);
-	}
+	view_run(w, 0);
 }
 
 void view_first_seen(const struct view_scene *v, const double org[3], const double dir[3],

@@ -6,14 +6,17 @@
 
 #include "direct.h"
 #include "light_way.h"
+#include "lobe_table.h"
 #include "reconstruct.h"
 #include "view.h"
+#include "view_images.h"
 
 /* What one side of a material does with directional light that leaves it towards
  * the eye, by reflection or by transmission. */
 struct view_lobe {
 	const double *coefficient;  /* [bands], NULL where there is none */
 	double k;
+	struct lobe_table table;    /* of a finite lobe */
 };
 
 struct view_side {
@@ -34,11 +37,19 @@ struct view_scene {
 	                               irradiance of the part (of all by VIEW_MESH) */
 	struct direct *direct;
 	struct view_side *side;     /* [2 materials] */
+	int lobes;                  /* there are finite lobes */
 	int tails;                  /* something reflects or transmits directionally */
+	struct view_images images;  /* if there are such */
 	int highlights;             /* there are punctual lights, and finite lobes */
 	struct light_ways ways;     /* of them, if so */
 	double ceiling[BANDS_MAX];  /* no radiance along an unsampled tail exceeds it */
 };
+
+/* What channel `at`, of [2 elements][bands], adds to the variance of the irradiance seen by
+ * way of something that blurs it, of which its element fills this part; with its direct light
+ * computed or not. Elements err apart from one another; but an interpolated value errs with
+ * the elements around, which pays only where the part is small. */
+double view_blurred(const struct view_scene *v, size_t at, double part, int computed);
 
 /* Up to how many directional events from the eye light is computed rather than
  * interpolated; behind a lobe that is sampled it is always interpolated. */
@@ -51,7 +62,13 @@ struct view_branch {
 	double share;               /* one over the samples it stands among */
 	int depth;                  /* directional events behind it */
 	int passes;                 /* goes through backs of one-sided materials */
-	int lobes;                  /* finite lobes behind it that were sampled */
+	int lobes;                  /* finite lobes behind it that were sampled; of the first: */
+	int straight;               /* has met nothing since */
+	double density;             /* of its direction, by solid angle */
+	double reach;               /* way since */
+	int turns;                  /* it has come by ideal events alone: 0 through panes, 1 + k by
+	                               mirror plane k once; -1 any other way */
+	uint32_t aimed;             /* 1 + the image that it goes to, for nothing else; or 0 */
 	uint32_t index;             /* low-discrepancy point and */
 	uint64_t seed;              /* scramble of its next lobe sample */
 };
@@ -67,15 +84,22 @@ struct view_shader;
 struct view_walker {
 	const struct view_scene *v;
 	const struct view_options *o;
-	struct view_shader *shader; /* for points whose light is to be computed; NULL: none is */
+	struct view_shader *shader; /* for points and lobes whose light is to be computed; NULL:
+	                               there are none */
 	uint32_t slot;              /* of the sample, that it is told with them */
-	int unlit;                  /* emitters are black, and so are all backs of one-sided
-	                               materials: what gathering finds */
+	int asking;                 /* lobes are not sampled: light is only asked for */
 	struct view_branch *stack;
 	size_t waiting;
 	double diffuse[BANDS_MAX], directional[BANDS_MAX], emission[BANDS_MAX];
+	double lit[BANDS_MAX];      /* by emitters straight to the lobe that is sampled */
+	struct view_aim aim;        /* of that lobe's samples */
 	double error[BANDS_MAX];    /* of interpolated light */
+	double blurred[BANDS_MAX];  /* squares of it, that the samples of a lobe have summed up */
 	double cut[BANDS_MAX];
+	/* Lobes seen by one ray about their axis: squares of what it counts with, and of lobes
+	 * that are probed that too, and squares of how far the ray is off. */
+	double axial[BANDS_MAX], probed[BANDS_MAX], off[BANDS_MAX];
+	int probing;                /* lobes are probed */
 	uint64_t rays;
 };
 
@@ -85,6 +109,15 @@ size_t view_stack_size(const struct view_options *o);
 /* Follows the camera ray b, of which org, dir, index and seed are given, and adds
  * the radiance it brings to w's parts. b is overwritten. */
 void view_follow(struct view_walker *w, struct view_branch *b);
+
+/* For what lib/view_lobe does on the way. Puts a branch that carries `scale` times
+ * `coefficient` of b's weight on the stack, or cuts it and books its bound. One of many
+ * samples of a lobe is cut by what all of them carry. */
+void view_push(struct view_walker *w, const struct view_branch *b, struct view_branch *next,
+               const double *coefficient, double scale);
+
+/* Follows the branches that wait but the first `below`. */
+void view_run(struct view_walker *w, size_t below);
 
 /* The surface the ray meets first. */
 void view_first_seen(const struct view_scene *v, const double org[3], const double dir[3],

@@ -8,12 +8,14 @@
 
 static const double pi = 3.14159265358979323846;
 
-static struct view_lobe lobe_of(const double *coefficient, int bands, double k)
+static void make_lobe(struct view_lobe *lobe, const double *coefficient, int bands, double k)
 {
+	lobe->k = k;
 	for (int b = 0; b < bands; b++)
 		if (coefficient[b] > 0)
-			return (struct view_lobe){ coefficient, k };
-	return (struct view_lobe){ NULL, 0 };
+			lobe->coefficient = coefficient;
+	if (lobe->coefficient && !isinf(k))
+		lobe_table_make(&lobe->table, k);
 }
 
 static void tabulate_side(const struct materials *mt, size_t material, int side,
@@ -29,10 +31,9 @@ static void tabulate_side(const struct materials *mt, size_t material, int side,
 		s->translucent |= s->across[b] > 0;
 		s->emits |= mt->emission[here + (size_t)b] > 0;
 	}
-	s->reflected = lobe_of(&mt->rho_s[here], mt->bands,
-	                       mt->alpha[2 * material + (size_t)side]);
-	s->transmitted = lobe_of(&mt->tau_s[across], mt->bands,
-	                         mt->beta[2 * material + (size_t)!side]);
+	make_lobe(&s->reflected, &mt->rho_s[here], mt->bands, mt->alpha[2 * material + (size_t)side]);
+	make_lobe(&s->transmitted, &mt->tau_s[across], mt->bands,
+	          mt->beta[2 * material + (size_t)!side]);
 }
 
 /* U with L_e + M/pi + s U <= U for what one corner of an element-side shows, s its
@@ -89,9 +90,9 @@ static int tabulate(struct view_scene *v, struct err *e)
 	for (size_t i = 0; v->side && i < sides; i++) {
 		tabulate_side(&v->m->material, i / 2, (int)(i % 2), &v->side[i]);
 		v->tails |= v->side[i].reflected.coefficient || v->side[i].transmitted.coefficient;
-		v->highlights |= v->m->light.n && (is_finite(&v->side[i].reflected) ||
-		                                   is_finite(&v->side[i].transmitted));
+		v->lobes |= is_finite(&v->side[i].reflected) || is_finite(&v->side[i].transmitted);
 	}
+	v->highlights = v->lobes && v->m->light.n;
 	return v->side ? 0 : -1;
 }
 
@@ -101,6 +102,22 @@ static const unsigned interpolated[] = { PART_ALL, PART_CAUSTIC | PART_INDIRECT,
 /* Errors of interpolated irradiance over those that the solution states of elements, of
  * noise and of discretisation: fits to several elements take part of both out. Measured. */
 static const double noise_left = .22, discretisation_left = .6;
+
+/* What is left of an error without that of a part. */
+static double without(const double *all, const double *part, size_t at)
+{
+	return all ? all[at] * all[at] - (part ? fmin(part[at], all[at]) * fmin(part[at], all[at]) : 0) : 0;
+}
+
+double view_blurred(const struct view_scene *v, size_t at, double part, int computed)
+{
+	const struct solution *s = v->s;
+	double noise = without(s->error, computed ? s->error_direct : NULL, at);
+	double missed = without(s->discretisation, computed ? s->discretisation_direct : NULL, at);
+
+	return fmin(noise_left * noise_left, part) * noise +
+	       fmin(1, part) * discretisation_left * discretisation_left * missed;
+}
 
 /* Group 0 of a solution with the parts that are interpolated alone, in arrays of its own. */
 static int part_solution(const struct solution *s, unsigned parts, struct solution *out, struct err *e)
@@ -187,7 +204,8 @@ struct view_scene *view_scene_new(const struct model *m, const struct solution *
 	v->rays = rays;
 	v->method = method;
 	if (!tabulate(v, e) && !interpolate(v, s, threads, e) && !find_misses(v, s, threads, e) &&
-	    (method == VIEW_MESH || (v->direct = direct_new(m, rays, e))) &&
+	    ((method == VIEW_MESH && !v->lobes) || (v->direct = direct_new(m, rays, e))) &&
+	    (!v->lobes || !view_images_init(&v->images, m, e)) &&
 	    (!v->highlights || !light_ways_new(m, rays, &v->ways, e))) {
 		if (v->tails)
 			find_ceiling(v);
@@ -207,6 +225,7 @@ void view_scene_free(struct view_scene *v)
 	if (!v)
 		return;
 	direct_free(v->direct);
+	view_images_free(&v->images);
 	light_ways_free(&v->ways);
 	reconstruction_free(&v->all);
 	reconstruction_free(&v->part);

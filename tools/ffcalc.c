@@ -105,6 +105,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 	if (!r->output)
 		cli_usage(c, "an output is needed: -o FILE.ff");
 	r->mesh = argv[optind];
+	cli_keep_input(c, r->output, r->mesh);
 	int hemicube = o->method == FF_HEMICUBE;
 	o->rays = n ? (uint32_t)n : hemicube ? 64 : 4096;
 	if (hemicube && (o->rays % 2 || o->rays > 8192))

@@ -74,6 +74,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		             "--npy are different outputs; ask for one");
 	if (r->output && !r->npy)
 		cli_usage(c, "--output is where --npy goes; redirect other output");
+	cli_keep_input(c, r->output, r->file);
 }
 
 static void content_free(struct content *x)

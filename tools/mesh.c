@@ -140,6 +140,9 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 	if (refines && !r->solution)
 		cli_usage(c, "--refine-error, -smallest and -elements need --refine FILE.rad");
 	r->scene = argv[optind];
+	cli_keep_input(c, r->output, r->scene);
+	if (r->solution)
+		cli_keep_input(c, r->output, r->solution);
 }
 
 /* ---- options and report as JSON ---- */
@@ -228,8 +231,9 @@ static json_t *materials_json(const struct mesher_report *r)
 
 static json_t *imprint_json(const struct mesher_report *r)
 {
-	return json_pack("{s:I, s:I, s:I}", "cut", (json_int_t)r->cut, "lines",
-	                 (json_int_t)r->lines, "fine_contacts", (json_int_t)r->fine_contacts);
+	return json_pack("{s:I, s:I, s:I, s:I}", "cut", (json_int_t)r->cut, "lines",
+	                 (json_int_t)r->lines, "fine_contacts", (json_int_t)r->fine_contacts,
+	                 "covered", (json_int_t)r->covered);
 }
 
 static json_t *pieces_json(const struct mesher_report *r)
@@ -329,6 +333,10 @@ static void print_counts(FILE *f, const struct job *j)
 	if (r->fine_contacts)
 		fprintf(f, "%s%zu contact%s of less than half an element left alone",
 		        r->cut ? "; " : "\nimprint     ", r->fine_contacts, plural(r->fine_contacts));
+	if (r->covered)
+		fprintf(f, "%s%zu part%s under coplanar surfaces dropped",
+		        r->cut || r->fine_contacts ? "; " : "\nimprint     ", r->covered,
+		        plural(r->covered));
 	if (j->r->solution)
 		fprintf(f, "\nrefined     %zu of %zu elements, %zu of %zu patches, %zu of them for lobes\n"
 		        "error       %.3g relative (%.3g of it from patches), %.3g expected now",

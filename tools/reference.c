@@ -28,7 +28,7 @@ static const struct cli_option option_table[] = {
 	{ OPT_SAMPLES, "samples", "N", "paths in each pixel (default: 64), or particles (1000000)" },
 	{ OPT_CENTRE, "centre", NULL, "sample each pixel at its centre, as trace --samples 1 does" },
 	{ OPT_SEED, "seed", "N", "start of the random numbers (default: 1)" },
-	{ OPT_COMPRESSION, "compression", "METHOD", "zip (default), zips, piz, rle or none" },
+	{ OPT_COMPRESSION, "compression", "METHOD", "auto (default), zip, zips, piz, rle or none" },
 	{ 0, NULL, NULL, NULL }
 };
 
@@ -57,7 +57,7 @@ static void compression(struct reference *r, const char *text)
 	int method = exr_file_compression_by_name(text);
 
 	if (method < 0)
-		cli_usage(&r->cli, "--compression: '%s' is none of zip, zips, piz, rle, none", text);
+		cli_usage(&r->cli, "--compression: '%s' is none of auto, zip, zips, piz, rle, none", text);
 	r->exr.compression = (enum exr_file_compression)method;
 }
 
@@ -92,6 +92,7 @@ static void parse(struct reference *r, int argc, char **argv)
 	if (argc - optind != 1)
 		cli_usage(c, argc == optind ? "a .mesh file is needed" : "one .mesh file at a time");
 	r->mesh = argv[optind];
+	cli_keep_input(c, r->output, r->mesh);
 	if (r->irradiance && (r->camera || r->width))
 		cli_usage(c, "--irradiance has no camera and no size");
 	if (r->irradiance && r->o.centre)

@@ -89,6 +89,7 @@ static void parse(struct cli *c, int argc, char **argv, struct options *o)
 	if (argc - optind != 1)
 		cli_usage(c, "one picture is needed");
 	o->input = argv[optind];
+	cli_keep_input(c, o->output, o->input);
 	if (!o->output)
 		cli_usage(c, "say with --output where the PNG goes");
 	if (o->bits != 8 && o->bits != 16)

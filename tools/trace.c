@@ -40,14 +40,14 @@ static const struct cli_option option_table[] = {
 	{ OPT_BUDGET, "budget", "SECONDS", "as many samples and rays as fit in, for each picture" },
 	{ OPT_SAMPLES, "samples", "N", "positions in each pixel (default: 4; 1: its centre)" },
 	{ OPT_LOBE_SAMPLES, "lobe-samples", "N",
-	  "rays into a finite lobe (default: 0: one, about its axis)" },
+	  "samples of a finite lobe (default: by their noise; 0: one ray about its axis)" },
 	{ OPT_GATHER_RAYS, "gather-rays", "N", "rays that -d gather takes at a point (default: 1024)" },
 	{ OPT_DEPTH, "depth", "N", "directional events that are followed (default: 32)" },
 	{ OPT_CUTOFF, "cutoff", "X", "cut tails that carry less than this part (default: 0.001)" },
 	{ OPT_LAYERS, "layers", "LIST",
 	  "also diffuse,directional,emission,Z,N,element,patch or all" },
 	{ OPT_HALF, "half", NULL, "colours as 16-bit floats" },
-	{ OPT_COMPRESSION, "compression", "METHOD", "zip (default), zips, piz, rle or none" },
+	{ OPT_COMPRESSION, "compression", "METHOD", "auto (default), zip, zips, piz, rle or none" },
 	{ OPT_MIX, "mix", "NAME=X,...",
 	  "scale the light of groups by X, or X:X:X for each band" },
 	{ 0, NULL, NULL, NULL }
@@ -65,7 +65,8 @@ struct shot {
 struct trace {
 	struct cli cli;
 	/* options */
-	const char *rad, *output, *mix;
+	const char *rad, *output;
+	char *mix;                  /* of all --mix together */
 	const char **camera;        /* [cameras] names asked for */
 	int cameras, all;
 	int width, height;
@@ -121,8 +122,23 @@ static void compression(struct trace *t, const char *text)
 	int method = exr_file_compression_by_name(text);
 
 	if (method < 0)
-		cli_usage(&t->cli, "--compression: '%s' is none of zip, zips, piz, rle, none", text);
+		cli_usage(&t->cli, "--compression: '%s' is none of auto, zip, zips, piz, rle, none", text);
 	t->exr.compression = (enum exr_file_compression)method;
+}
+
+/* Appends to what was to be mixed before. */
+static void take_mix(struct trace *t, const char *more)
+{
+	size_t n = t->mix ? strlen(t->mix) : 0, size = n + strlen(more) + 2;
+	char *mix = realloc(t->mix, size);
+	struct err e = { 0 };
+
+	if (!mix) {
+		err_set(&e, "out of memory for --mix");
+		exit(cli_fail(&t->cli, &e));
+	}
+	snprintf(mix + n, size - n, "%s%s", n ? "," : "", more);
+	t->mix = mix;
 }
 
 static void take_camera(struct trace *t, const char *name)
@@ -164,13 +180,13 @@ static void take_option(struct trace *t, int letter)
 		t->view.depth = (int)cli_integer(c, "--depth", optarg, 0, 100000);
 		break;
 	case OPT_CUTOFF: t->view.cutoff = cli_number(c, "--cutoff", optarg, 0, 1); break;
-	case OPT_MIX: t->mix = optarg; break;
+	case OPT_MIX: take_mix(t, optarg); break;
 	case OPT_HALF: t->exr.half = 1; break;
 	case OPT_COMPRESSION: compression(t, optarg); break;
 	case OPT_LAYERS:
 		if (view_parse_layers(optarg, &t->view.layers))
 			cli_usage(c, "--layers: '%s' is not a list of diffuse, directional, emission, "
-			          "Z, N, element, patch or all", optarg);
+			          "Z, N, element, patch, error or all", optarg);
 		break;
 	}
 }
@@ -185,6 +201,7 @@ static void parse(struct trace *t, int argc, char **argv)
 	if (argc - optind != 1)
 		cli_usage(c, argc == optind ? "a .rad file is needed" : "one .rad file at a time");
 	t->rad = argv[optind];
+	cli_keep_input(c, t->output, t->rad);
 	if (!t->output)
 		cli_usage(c, "-o is needed: the picture to write");
 	if (t->has_eye != t->has_target)
@@ -362,11 +379,30 @@ static int describe(const struct trace *t, const struct shot *s, const struct vi
 	       exr_file_info_set(info, "statistics", statistics, e) ? -1 : 0;
 }
 
+/* Is some colour too bright for 32-bit floats? */
+static int beyond_float(const struct image *im)
+{
+	static const char *const colour[] = { "R", "G", "B" };
+	size_t pixels = (size_t)im->width * (size_t)im->height;
+
+	for (int c = 0; c < 3; c++) {
+		const float *plane = image_plane(im, image_channel(im, colour[c]));
+		for (size_t i = 0; i < pixels; i++)
+			if (!isfinite(plane[i]))
+				return 1;
+	}
+	return 0;
+}
+
 static int write_picture(const struct trace *t, const struct shot *s,
                          const struct view_stats *v, const struct image *im, struct err *e)
 {
 	struct exr_file_info info = { 0 };
 	size_t clipped = 0;
+
+	if (beyond_float(im))
+		return err_set(e, "%s: radiance is beyond the range of 32-bit floats; scale down what "
+		               "emits, or --mix", s->path);
 	int bad = describe(t, s, v, &info, e) ||
 	          exr_file_write(s->path, im, &info, &t->exr, &clipped, e);
 
@@ -463,6 +499,7 @@ static void release(struct trace *t)
 		free(t->shot[i].path);
 	free(t->shot);
 	free(t->camera);
+	free(t->mix);
 	free(t->ad_hoc.name);
 	free(t->history);
 	view_scene_free(t->scene);
@@ -477,10 +514,10 @@ int main(int argc, char **argv)
 {
 	struct trace t = {
 		.cli = { .program = "trace", .synopsis = "[options] FILE.rad -o PICTURE.exr",
-		         .about = "Render views of a solved scene, following mirrors and panes.",
+		         .about = "Render views of a solved scene, following mirrors, panes and lobes.",
 		         .options = option_table, .uses_threads = 1 },
 		.method = VIEW_DIRECT,
-		.view = { .depth = 32, .cutoff = 1e-3 }
+		.view = { .depth = 32, .cutoff = 1e-3, .lobe_samples = VIEW_LOBE_ENOUGH }
 	};
 	struct err e = { 0 };
 	int status = 0;

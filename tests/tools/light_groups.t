@@ -49,13 +49,14 @@ for part in ("direct", "caustic", "indirect"):
     a, b = mixed["irradiance_" + part][0], groups["irradiance_" + part]
     assert np.abs(a - (factor * b).sum(0)).max() <= 1e-7 * a.max()' "$T/mixed.rad" "$T/groups.rad"
 mix="ceiling lamp=.5:.5:.25,lantern=2"
-look() { trace "$1" -c overview -s 80x60 -o "$2" --samples 4 $3 "$4"; }
+# As many samples of lobes in both: how many it takes depends on the errors that are stated.
+look() { trace "$1" -c overview -s 80x60 -o "$2" --samples 4 --lobe-samples 4 $3 "$4"; }
 check "a picture of a mix" look "$T/groups.rad" "$T/groups.exr" --mix "$mix"
-prepare look "$T/mixed.rad" "$T/mixed.exr" --lobe-samples 0
+prepare look "$T/mixed.rad" "$T/mixed.exr" --depth 32
 # But for how interpolation weighs the errors that are stated.
 check "is one of other lamps" exrcmp --max-rel 1e-2 "$T/groups.exr" "$T/mixed.exr"
 check "the same mix again: up to date" sh -c \
-	"trace '$T/groups.rad' -c overview -s 80x60 -o '$T/groups.exr' --samples 4 --mix '$mix' 2>&1 | grep -q 'up to date'"
+	"trace '$T/groups.rad' -c overview -s 80x60 -o '$T/groups.exr' --samples 4 --lobe-samples 4 --mix '$mix' 2>&1 | grep -q 'up to date'"
 check "one group of all: twice as bright" sh -c "
 	trace -q '$T/one.rad' -c overview -s 40x30 -o '$T/1.exr' --compression none &&
 	trace -q '$T/one.rad' -c overview -s 40x30 -o '$T/2.exr' --compression none --mix all=2 &&
@@ -65,6 +66,13 @@ sys.exit(not np.abs(2 * a - b).max() <= 1e-5 * b.max())' '$T/1.exr' '$T/2.exr'"
 
 refuses 1 "no light group 'lamp'; there are: ceiling lamp, lantern" "an unknown group" \
 	trace "$T/groups.rad" -c overview -o "$T/out" --mix lamp=2
+refuses 1 "'lantern' is not NAME=X" "no factor" \
+	trace "$T/groups.rad" -c overview -o "$T/out" --mix lantern
+refuses 1 "beyond the range of 32-bit floats" "a factor that no picture holds" \
+	trace "$T/groups.rad" -c overview -s 8x6 -o "$T/out" --mix lantern=1e300
+prepare trace -q "$T/groups.rad" -c overview -s 8x6 -o "$T/1.exr" --mix lantern=0,"ceiling lamp=2"
+prepare trace -q "$T/groups.rad" -c overview -s 8x6 -o "$T/2.exr" --mix lantern=0 --mix "ceiling lamp=2"
+check "--mix twice" exrcmp --max-rel 0 "$T/1.exr" "$T/2.exr"
 refuses 1 "solve with shoot --light-groups" "a group of a solution without" \
 	trace "$T/one.rad" -c overview -o "$T/out" --mix lantern=2
 for wrong in "lantern=-1" "lantern=x" "lantern=1:2" "lantern=1:2:3:4" "lantern=1;all=2"; do

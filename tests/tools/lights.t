@@ -55,6 +55,22 @@ prepare solve beam
 prepare trace "$T/beam.rad" -c eye -d direct -o "$T/beam.exr" $V
 check "mixed is as lit so" exrcmp --max-rel 1e-5 "$T/mixed.exr" "$T/beam.exr"
 
+# Particles of a light that grazes the floor arrive: (1, .2, -.01), of 1 lx across it.
+$PYTHON - "$T/low.gltf" "$scenes" <<'END'
+import sys
+sys.path.insert(0, sys.argv[2])
+from gltf_writer import Scene
+
+s = Scene("low")
+floor = s.material("floor", {"rho_d": .5})
+s.rectangle("floor", [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], floor)
+s.light("sun", "directional", direction=(1, .2, -.01), intensity=1)
+s.write(sys.argv[1])
+END
+prepare mesh "$T/low.gltf" -o "$T/low.mesh" -p inf -e inf
+check "particles arrive on what they graze" sh -c "reference --irradiance -q --samples 1000 '$T/low.mesh' |
+	awk -F, 'NR > 1 { h += \$5 * \$6; a += \$5 } END { x = h / a / .0098053; exit !(x > .999 && x < 1.001) }'"
+
 # Images in two mirrors that meet in a corner: highlights alone, no noise.
 $PYTHON - "$T/corner.gltf" "$scenes" <<'END'
 import sys

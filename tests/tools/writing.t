@@ -29,6 +29,14 @@ for tool in $tools; do
 		writes $tool "$T/a.mesh/out"
 done
 
+# What is read is not written over.
+for job in "mesh s.gltf -o ./s.gltf" "mesh s.gltf --refine a.rad -o a.rad" "ffcalc a.mesh -o a.mesh" \
+		"shoot a.mesh a.ff -o a.ff" "trace a.rad -o a.rad" "reference a.mesh -o a.mesh" \
+		"tone a.exr -o a.exr" "inspect a.mesh --npy vertex -o a.mesh"; do
+	cp "$scenes/cornell.gltf" "$T/s.gltf"
+	refuses 2 "is what is to be read" "$job" sh -c "cd '$T' && $job"
+done
+
 # A directory one may not write to.
 mkdir "$T/locked"
 chmod 555 "$T/locked"

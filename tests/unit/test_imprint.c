@@ -327,6 +327,41 @@ static void test_close(void **state)
 		}
 }
 
+/* A sheet in the plane of a floor covers it, turned over or not, however small, unless it
+ * lets light through. */
+static void test_covered(void **state)
+{
+	(void)state;
+	for (int i = 0; i < 4; i++)
+		for (int place = 0; place < 3; place++) {
+			struct model m;
+			double frame[3][3];
+			begin(&m, 2, i == 1);
+			add_rectangle(&m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 },
+			              (double[]){ 0, 1, 0 }, 0);
+			if (i == 1)
+				add_rectangle(&m, (double[]){ .3, .1, 0 }, (double[]){ 0, .4, 0 },
+				              (double[]){ .3, 0, 0 }, 1);
+			else
+				add_rectangle(&m, (double[]){ .3, .1, 0 },
+				              (double[]){ i == 2 ? .01 : .3, 0, 0 },
+				              (double[]){ 0, .4, 0 }, 1);
+			if (i == 3)
+				m.material.tau_d[material_at(&m.material, 1, BACK)] = .1;
+			put(&m, place);
+			frame_of(&m, 0, frame);
+			double unit = v3_length(frame[1]);
+			struct mesher_report r = run(&m, sizes(.2 * unit, .1 * unit, 0));
+			double gone = i == 3 ? 0 : i == 2 ? .004 : .12;
+			assert_true((r.covered > 0) == (i < 3));
+			assert_int_equal(r.merged > 0, i == 1); /* the floor shows on the sheet's back */
+			double area = input_area(&m) / (unit * unit), given = i == 2 ? 1.004 : 1.12;
+			assert_true(fabs(area - given + gone) < 1e-9);
+			mesher_report_free(&r);
+			model_free(&m);
+		}
+}
+
 static void test_options(void **state)
 {
 	struct model m;
@@ -462,6 +497,7 @@ int main(void)
 		cmocka_unit_test(test_room_is_whole),
 		cmocka_unit_test(test_flush),
 		cmocka_unit_test(test_close),
+		cmocka_unit_test(test_covered),
 		cmocka_unit_test(test_options),
 		cmocka_unit_test(test_random),
 		cmocka_unit_test(test_many),

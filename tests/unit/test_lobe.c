@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "../../lib/lobe.h"
+#include "../../lib/lobe_table.h"
 #include "../../lib/rng.h"
 #include "../../lib/vec3.h"
 
@@ -160,6 +161,19 @@ static void test_normaliser_any_exponent(void **state)
 	}
 }
 
+static void test_table(void **state)
+{
+	(void)state;
+	for (double k = 0; k <= 1e8; k = 2 * k + .7) {
+		struct lobe_table t;
+		lobe_table_make(&t, k);
+		for (int i = 0; i <= 1000; i++) {
+			double c = fmin(1, i * .008 / sqrt(k + 1));
+			assert_close(lobe_table_normaliser(&t, c), lobe_normaliser(k, c), 1e-5);
+		}
+	}
+}
+
 static void test_power(void **state)
 {
 	(void)state;
@@ -281,7 +295,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_normaliser_table),
-		cmocka_unit_test(test_normaliser_any_exponent),
+		cmocka_unit_test(test_normaliser_any_exponent), cmocka_unit_test(test_table),
 		cmocka_unit_test(test_power),
 		cmocka_unit_test(test_albedo_table),
 		cmocka_unit_test(test_albedo),

@@ -1,4 +1,4 @@
-/* Pictures of solved scenes: furnaces, mirrors, panes, lobes, layers, cuts. */
+/* Pictures of solved scenes: furnaces, mirrors, panes, layers, cuts. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -6,106 +6,9 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#include "grid.h"
+#include "stage.h"
 
-#include "../../lib/lobe.h"
-#include "../../lib/view.h"
 #include "../../lib/vec3.h"
-
-#define PI 3.14159265358979323846
-
-/* A scene with its solution, ready to be viewed. */
-struct stage {
-	struct model m;
-	struct solution s;
-	struct ray_scene *rays;
-	struct view_scene *view;
-};
-
-static void use_method(struct stage *t, enum view_method method)
-{
-	struct err e = { 0 };
-
-	view_scene_free(t->view);
-	assert_non_null(t->view = view_scene_new(&t->m, &t->s, t->rays, method, 1, &e));
-}
-
-static void stage_end(struct stage *t, double h)
-{
-	struct err e = { 0 };
-
-	grid_end(&t->m);
-	grid_solution(&t->m, h, &t->s);
-	assert_non_null(t->rays = ray_scene_new(&t->m, &e));
-	use_method(t, VIEW_MESH);
-}
-
-static void stage_free(struct stage *t)
-{
-	view_scene_free(t->view);
-	ray_scene_free(t->rays);
-	grid_solution_free(&t->s);
-	model_free(&t->m);
-}
-
-static struct view_frame frame(double ex, double ey, double ez, double tx, double ty,
-                               double tz, int width, int height)
-{
-	double eye[3] = { ex, ey, ez }, target[3] = { tx, ty, tz }, up[3] = { .1, .2, 1 };
-	struct camera c;
-	struct view_frame f;
-	struct err e = { 0 };
-
-	assert_int_equal(camera_look_at(eye, target, up, 70, &c, &e), 0);
-	assert_int_equal(camera_frame(&c, width, height, &f, &e), 0);
-	return f;
-}
-
-static struct view_options options(void)
-{
-	return (struct view_options){ .samples = 1, .depth = 32, .cutoff = 1e-3, .threads = 1 };
-}
-
-static struct view_stats render(const struct stage *t, const struct view_frame *f,
-                                const struct view_options *o, struct image *im)
-{
-	struct view_stats stats;
-	struct err e = { 0 };
-
-	assert_int_equal(view_render(t->view, f, o, NULL, im, &stats, &e), 0);
-	return stats;
-}
-
-/* One pixel that looks from eye to target. */
-static double look(const struct stage *t, const struct view_options *o, double ex,
-                   double ey, double ez, double tx, double ty, double tz)
-{
-	struct view_frame f = frame(ex, ey, ez, tx, ty, tz, 1, 1);
-	struct image im;
-
-	render(t, &f, o, &im);
-	double v = (double)im.pixel[0];
-	image_free(&im);
-	return v;
-}
-
-/* Sets all bands of a side; emission fills the side up to radiance 1 / pi. */
-static void set(struct model *m, size_t material, int side, double rho_d, double tau_d,
-                double rho_s, double tau_s, double k)
-{
-	struct materials *mt = &m->material;
-	size_t at = material_at(mt, material, side);
-
-	for (size_t b = at; b < at + (size_t)mt->bands; b++) {
-		mt->rho_d[b] = rho_d;
-		mt->tau_d[b] = tau_d;
-		mt->rho_s[b] = rho_s;
-		mt->tau_s[b] = tau_s;
-		mt->emission[b] = (1 - rho_d - tau_d - rho_s - tau_s) / PI;
-	}
-	mt->alpha[2 * material + (size_t)side] = k;
-	mt->beta[2 * material + (size_t)side] = k;
-}
 
 /* A closed box of irradiance 1: diffuse and mirror walls, and across its middle a
  * sheet that does everything. Everything must look 1 / pi bright. */
@@ -255,29 +158,6 @@ static void test_threads(void **state)
 	stage_free(&t);
 }
 
-/* A wall at z = 0 whose two sides differ: which coefficients count. */
-static void wall(struct stage *t, enum lobe_kind kind)
-{
-	double o[3] = { -5, -5, 0 }, x[3] = { 10, 0, 0 }, y[3] = { 0, 10, 0 };
-	double up[3] = { -50, -50, 4 }, px[3] = { 100, 0, 0 }, py[3] = { 0, 100, 0 };
-	double down[3] = { -50, -50, -4 };
-
-	*t = (struct stage){ 0 };
-	grid_new(&t->m, 3, 2, 3, 1);
-	t->m.lobe = kind;
-	set(&t->m, 0, FRONT, .1, .2, 0, .3, (double)INFINITY);
-	set(&t->m, 0, BACK, .15, .25, .4, .05, (double)INFINITY);
-	t->m.material.emission[0] = .5;
-	t->m.material.emission[1] = .25;
-	for (size_t i = 1; i < 3; i++) { /* lamps above and below, towards the wall */
-		t->m.material.emission[2 * i] = t->m.material.emission[2 * i + 1] = 0;
-		t->m.material.emission[2 * i + (i == 1)] = i == 1 ? 10 : 20;
-	}
-	grid_quad(&t->m, 2, 0, o, x, y);
-	grid_quad(&t->m, 2, 1, up, px, py);
-	grid_quad(&t->m, 2, 2, down, px, py);
-}
-
 static void test_sides(void **state)
 {
 	struct view_options o = options();
@@ -296,43 +176,6 @@ static void test_sides(void **state)
 	double back = .25 + (.15 * 3 + .2 * 2) / PI + .4 * 20 + .3 * 10;
 	assert_true(fabs(look(&t, &o, .1, .2, -1, .3, .1, 0) - back) < 1e-5);
 	stage_free(&t);
-}
-
-/* Uniform surroundings of radiance 10 seen in a lobe at 60 degrees. */
-static void test_lobes(void **state)
-{
-	double cosine = .5, k = 30;
-	(void)state;
-
-	for (int kind = 0; kind < 2; kind++) {
-		struct stage t;
-		struct view_options o = options();
-		wall(&t, kind ? LOBE_RECIPROCAL : LOBE_PAPER);
-		set(&t.m, 0, FRONT, 0, 0, .6, 0, k);
-		set(&t.m, 0, BACK, 0, 0, 0, 0, k);
-		t.m.material.emission[0] = t.m.material.emission[1] = 0;
-		stage_end(&t, 0);
-		double x = sqrt(.75), a = lobe_albedo(k, cosine);
-		double one = look(&t, &o, x, 0, .5, 0, 0, 0);
-		assert_true(fabs(one - 10 * .6 * (kind ? a : 1)) < 1e-4);
-		o.lobe_samples = 4096;
-		double many = look(&t, &o, x, 0, .5, 0, 0, 0), expected = 0, sum = 0;
-		/* The same integral by quadrature over the lobe. */
-		for (int i = 0; i < 400; i++)
-			for (int j = 0; j < 400; j++) {
-				double c = (i + .5) / 400, s = sqrt(1 - c * c);
-				double p = 2 * PI * (j + .5) / 400;
-				double g = -s * cos(p) * x + c * cosine;
-				double w = lobe_power(k, g) * 2 * PI / 160000.;
-				expected += w * c / (kind ? fmax(c, cosine)
-				                          : lobe_normaliser(k, c) * cosine);
-				sum += w;
-			}
-		expected *= 10 * .6 * (kind ? (k + 1) / (2 * PI) : 1);
-		assert_true(fabs(sum / lobe_normaliser(k, cosine) - 1) < 1e-3);
-		assert_true(fabs(many / expected - 1) < 5e-3);
-		stage_free(&t);
-	}
 }
 
 /* Camera rays and their straight-through continuations pass black backs, mirrored
@@ -409,7 +252,7 @@ int main(void)
 		cmocka_unit_test(test_furnace), cmocka_unit_test(test_cut_bound),
 		cmocka_unit_test(test_layers), cmocka_unit_test(test_layer_names),
 		cmocka_unit_test(test_threads), cmocka_unit_test(test_sides),
-		cmocka_unit_test(test_lobes), cmocka_unit_test(test_one_sided),
+		cmocka_unit_test(test_one_sided),
 		cmocka_unit_test(test_background_and_bands)
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

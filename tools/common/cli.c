@@ -10,10 +10,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "../../formats/atomic_file.h"
+#include "../../lib/mem.h"
 
 /* Letters of the common options that have no short form: beyond any table's. */
 enum { LETTER_HELP = 100000, LETTER_VERSION };
@@ -58,6 +60,15 @@ void cli_usage(const struct cli *c, const char *format, ...)
 	va_end(ap);
 	fprintf(stderr, "Try '%s --help' for more information.\n", c->program);
 	exit(2);
+}
+
+void cli_keep_input(const struct cli *c, const char *output, const char *input)
+{
+	struct stat to, from;
+
+	if (output && !stat(output, &to) && !stat(input, &from) && S_ISREG(from.st_mode) &&
+	    to.st_dev == from.st_dev && to.st_ino == from.st_ino)
+		cli_usage(c, "--output: %s is what is to be read", output);
 }
 
 void cli_warn(const struct cli *c, const char *format, ...)
@@ -413,6 +424,7 @@ void cli_signals(void)
 	for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
 		if (sigaction(numbers[i], NULL, &old) == 0 && old.sa_handler != SIG_IGN)
 			sigaction(numbers[i], &tidy, NULL);
+	mem_keep();
 	/* A file-size limit then shows as a write error, with its message. */
 	signal(SIGXFSZ, SIG_IGN);
 }

@@ -35,6 +35,9 @@ int cli_next(struct cli *c, int argc, char **argv);
 void cli_usage(const struct cli *c, const char *format, ...)
     __attribute__((noreturn, format(printf, 2, 3)));
 
+/* Wrong usage if `output` (may be NULL) is the regular file `input`, which would be lost. */
+void cli_keep_input(const struct cli *c, const char *output, const char *input);
+
 /* "prog: <text>" on stderr; cli_note not with -q, cli_detail only with -v. */
 void cli_warn(const struct cli *c, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
