@@ -47,7 +47,7 @@ SECTIONS = {  # what is submitted first of all, and what is timed and written th
     "exponents": (directional.submit_exponents, directional.exponent),
     "growth": (None, growth.section)}
 APART = {"speed-long": (speed.submit_long, speed.long_section)}  # only if asked for
-MINUTES = 20
+MINUTES, YARDSTICKS = 20, "yardsticks of "
 
 
 class Spent:
@@ -88,6 +88,8 @@ class Run:
                 self.tell(f"{i} of {len(jobs)} jobs that are not timed")
         self.pool.shutdown()
         elapsed, _ = self.spent.seconds()
+        for name in self.scenes:
+            self.collected(YARDSTICKS + name)  # nothing goes without
         for kind, calls in self.jobs.items():
             took = sum(j.result()[1] for j in calls.values() if not j.exception())
             self.times.append([f"{kind}, side by side", "", f"{took:.0f}"])
@@ -101,8 +103,8 @@ class Run:
         """Its yardsticks are submitted when it is first asked for."""
         if name not in self.scenes:
             scene = self.scenes[name] = Scene(name, self.work, *self.plan.samples[name])
-            self.submit(f"yardsticks of {name}", {path: (ran, *words) for path, words in
-                                                  scene.commands().items()})
+            self.submit(YARDSTICKS + name, {path: (ran, *words) for path, words in
+                                            scene.commands().items()})
         return self.scenes[name]
 
     def directory(self, name):
