@@ -79,7 +79,8 @@ def steep_cuts():
     """Fractions of an edge: towards its ends elements shrink as the cube of the distance,
     and the last to 4e-5, since radiosity goes as about its power of .7 there; elements of
     .002 stand at the quarters and the middle, where values are read."""
-    half = [0, 4e-5, *(2e-4 * i ** 3 for i in range(1, 10)), .2, .249, *np.linspace(.251, .499, 7)]
+    half = [0, 4e-5, *(2e-4 * i ** 3 for i in range(1, 10)), .179, .214, .249,
+            *np.linspace(.251, .499, 8)]
     return half + [1 - x for x in half[::-1]]
 
 
