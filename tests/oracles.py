@@ -117,7 +117,8 @@ BEST = {
 }
 # Particles of the yardstick: fewer where each one is reflected a thousand times, more where
 # small elements see few of them.
-PARTICLES = {"*rho0.999": 40000, "facing_mirrors_*": 400000, "sphere_two_materials": 32000000, "*": 4000000}
+PARTICLES = {"*rho0.999": 40000, "facing_mirrors_*": 400000, "sphere_two_materials": 32000000,
+             "*": 4000000}
 RUNS = 4  # of the settings of BEST, whose mean is judged
 # Independent runs of the yardstick, and what widens their spread so that normal quantiles
 # up to 4 are at least Student's of so many runs.
@@ -222,10 +223,12 @@ def side_of(row):
 
 def fitted_weights(corners, receiver, point):
     """Weights of the means of elements in the value at a point of their plane: that of the
-    receiver there if it is tiny, else of the quadratic that fits the nearest receivers' best. corners: [n][3][3]; receiver: [n], what an
-    element got its value as a part of. Returns indices and weights."""
+    receiver there if it is tiny, else of the quadratic that fits the nearest receivers' best.
+    corners: [n][3][3]; receiver: [n], what an element got its value as a part of. Returns
+    indices and weights."""
     _, of = np.unique(receiver, return_inverse=True)
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    edges = corners[:, 1:] - corners[:, :1]
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     share = area / np.bincount(of, area)[of]
     sums = lambda values: np.stack([np.bincount(of, share * v) for v in values], 1)
     distance = np.linalg.norm(sums(corners.mean(1).T) - np.asarray(point, float), axis=1)
@@ -327,7 +330,8 @@ def pixels(oracle, method, e, field, rads, folder):
             run("trace", rad, "-c", view, "-o", path, *VIEW)
             planes = picture(path)
             got = got + np.concatenate([planes[c].ravel() for c in "RGB"]) / len(rads)
-        yield Value(oracle["id"], method, e, got, error.max() / math.pi, f"every pixel of camera {view}")
+        yield Value(oracle["id"], method, e, got, error.max() / math.pi,
+                    f"every pixel of camera {view}")
 
 
 def chain_field(rad):
@@ -514,7 +518,8 @@ def main():
     p.add_argument("--method", choices=["hemicube", "rays", "best", "reference"])
     p.add_argument("ids", nargs="*")
     a = p.parse_args()
-    methods = ["reference"] if a.reference else [a.method] if a.method else ["hemicube", "rays"] if a.named else ["hemicube", "rays", "best"]
+    methods = ["reference"] if a.reference else [a.method] if a.method else \
+        ["hemicube", "rays"] + ["best"] * (not a.named)
     known = oracles()
     unknown = [i for i in a.ids if i not in known]
     if unknown or not (a.named or a.all or a.ids):

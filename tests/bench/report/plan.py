@@ -61,7 +61,8 @@ FULL = Plan(
     repeat_views=5, solutions=99, steps=99,
     ff_scenes=("cube16", "cube24", "room", "room-turned", "city100", "city370", "city2100"),
     ff_rays=409600, oracles=(), oracle_methods=("hemicube", "rays", "best"), hard=True,
-    lobe_scenes=(), lobe_exponents=(5, 20, 100, 1000), lobe_schemes=("paper", "centroid", "one lobe", "default", "fine"),
+    lobe_scenes=(), lobe_exponents=(5, 20, 100, 1000),
+    lobe_schemes=("paper", "centroid", "one lobe", "default", "fine"),
     lobe_samples=16_000_000, lobe_size=.25, exponents=EXPONENTS)
 QUICK = Plan(
     about="A quick try of the programs: samples are so few that the errors mean nothing.",
