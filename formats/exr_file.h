@@ -33,11 +33,12 @@ const char *exr_file_info_get(const struct exr_file_info *i, const char *name);
 void exr_file_info_free(struct exr_file_info *i);
 
 enum exr_file_compression {
-	EXR_FILE_ZIP, /* the default: 16 rows together */
+	EXR_FILE_AUTO, /* the default: zip, except for rows that it hardly makes smaller */
+	EXR_FILE_ZIP,  /* 16 rows together */
 	EXR_FILE_ZIPS, EXR_FILE_PIZ, EXR_FILE_RLE, EXR_FILE_NONE
 };
 
-/* The compression called zip, zips, piz, rle or none; -1 when there is none such. */
+/* The compression called auto, zip, zips, piz, rle or none; -1 when there is none such. */
 int exr_file_compression_by_name(const char *name);
 
 struct exr_file_options {

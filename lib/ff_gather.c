@@ -114,10 +114,10 @@ static int is_by_formula(const struct ff_job *j, uint32_t ps)
 	return ff_formula_has(&j->formula, ps) && (j->formula.all || j->emits[ps]);
 }
 
-static int takes(const struct ff_job *j, double patch_area, double element_area, uint32_t rays)
+static int takes(double patch_area, uint32_t cast, double element_area, uint32_t rays)
 {
 	return patch_area >= larger * element_area &&
-	       rays * patch_area >= enough * j->o.rays * element_area;
+	       rays * patch_area >= enough * cast * element_area;
 }
 
 /* Pairs by receiver, in order, become lists by source, in the same order. */
@@ -221,7 +221,7 @@ static int any_takes(const struct ff_job *j)
 			most = fmax(most, j->m->patch_area[ps >> 1]);
 	for (size_t i = 0; i < j->m->elements; i++)
 		least = fmin(least, j->m->element_area[i]);
-	return takes(j, most, least, j->o.gather);
+	return takes(most, j->o.rays, least, j->o.gather);
 }
 
 /* Rows by formula are made of sights too, whatever their sizes. */
@@ -284,8 +284,8 @@ void ff_gather_free(struct ff_gather *g)
 
 static int element_takes(const struct ff_job *j, uint32_t ps, uint32_t column)
 {
-	return takes(j, j->m->patch_area[ps >> 1], j->m->element_area[column >> 1],
-	             ff_gather_rays(j, column >> 1));
+	return takes(j->m->patch_area[ps >> 1], j->o.rays >> (j->halvings ? j->halvings[ps] : 0),
+	             j->m->element_area[column >> 1], ff_gather_rays(j, column >> 1));
 }
 
 int ff_row_is_seen(const struct ff_job *j, uint32_t ps)
@@ -435,8 +435,7 @@ static double landing(const struct ff_thread *t, uint32_t ps, uint32_t cast, dou
 int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_weight *w)
 {
 	const struct ff_job *j = t->job;
-	uint32_t wanted = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
-	double sum = ff_row_is_seen(j, ps) ? ff_see(t, ps, wanted, &t->tally.err) : recall(t, ps);
+	double sum = ff_row_is_seen(j, ps) ? ff_see(t, ps, ff_row_rays(j, ps), &t->tally.err) : recall(t, ps);
 	struct tale a = add_up(t, sum);
 	double rays, said = landing(t, ps, cast, &rays), lands = settle(said, rays, &a);
 	double per_sample = a.variance / (ff_row_is_seen(j, ps) ? 1 : worth(j->gather.rays));

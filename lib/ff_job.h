@@ -11,8 +11,10 @@
 #include "ray.h"
 #include "rng.h"
 
-/* FF_CLOSE_RAYS: a power of two that an element close to an emitter casts. */
-enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048 };
+/* FF_CLOSE_RAYS: a power of two that an element close to an emitter casts.
+ * FF_HALVINGS: the most of a row's rays. */
+enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048,
+       FF_HALVINGS = 3 };
 
 /* An element as a place to send rays from. Points are corner + w1 edge[0] + w2 edge[1],
  * with weights that keep a little clear of the edges. Threes are padded to four. */
@@ -23,6 +25,7 @@ struct ff_element {
 	double per_area;
 	uint32_t before;          /* 2^32 times the part of the patch's area before it */
 	float per_part;           /* 1 / the same of its own area */
+	double size;              /* root of its area, or how far its corners are from its centre */
 };
 
 /* The first points of the Sobol sequence, in an order in which neighbours have similar
@@ -64,6 +67,7 @@ struct ff_job {
 	uint8_t *emits;           /* [2P] gives light of its own */
 	uint8_t *is_source;       /* [2P] any light leaves here */
 	uint32_t chain_most;      /* where counts of ideal events of a colour stop */
+	uint32_t lobes;           /* patch-sides that have one */
 	int has_panes, has_ideal; /* any clear pane; any ideal surface */
 	struct light_images images; /* in one mirror each */
 	double small_area;        /* elements below gather with a quarter of the rays: what they
@@ -71,6 +75,7 @@ struct ff_job {
 	struct ff_samples of_rows, of_gathering, of_small;
 	struct tally_places places;
 	struct ff_gather gather;
+	uint8_t *halvings;        /* [2P] how often the rays of a row are halved; NULL: never */
 	struct ff_formula formula;
 };
 
@@ -123,12 +128,36 @@ struct ff_thread {
 	struct vec chain_map;     /* local -> whole */
 };
 
+static inline int ff_by_formula(const struct ff_options *o)
+{
+	return o->method == FF_ANALYTIC || o->method == FF_AUTO;
+}
+
+/* What a job needs whatever it makes. O(elements + triangles log triangles). 0, or -1 and e;
+ * either way free it. */
+int ff_job_init(struct ff_job *j, const struct model *m, const struct ff_options *o,
+                struct err *e);
+void ff_job_free(struct ff_job *j);
+
+/* What rows that are computed one by one, of patches or of lights alone, need beside. */
+int ff_job_prepare(struct ff_job *j, int patches, struct err *e);
+
+/* Fills job->of_rows, of_gathering, of_small. O(points log points). 0, or -1 and e. */
+int ff_points(struct ff_job *j, struct err *e);
+
+int ff_thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e);
+void ff_thread_free(struct ff_thread *t);
+
 /* Sets job->chain_most: as high as keeps chains few, by what a few rays meet. O(depth)
  * rays. 0, or -1 and e. */
 int ff_find_chain_most(struct ff_job *j, struct err *e);
 
 /* Fills job->element. O(elements). */
 void ff_element_table(struct ff_job *j);
+
+/* The element of a patch that a number in [0,1) chooses by area; what is left of the
+ * number, again uniform, replaces it. */
+uint32_t ff_choose(const struct ff_job *j, uint32_t patch, double *u);
 
 /* A point on a patch, uniform by area, from two numbers in [0,1): its element and
  * position (on the surface, not moved off it). */
@@ -186,6 +215,20 @@ static inline uint32_t ff_gather_rays(const struct ff_job *j, uint32_t element)
 {
 	return j->m->element_area[element] < j->small_area ? j->o.gather / 4 : j->o.gather;
 }
+
+/* Rays that a patch-side's diffuse row casts, if any. */
+static inline uint32_t ff_row_rays(const struct ff_job *j, uint32_t ps)
+{
+	return j->emits[ps] ? j->o.rays * j->o.emitter_gain
+	                    : j->o.rays >> (j->halvings ? j->halvings[ps] : 0);
+}
+
+/* How often the rays of a row can be halved so that each replicate is a whole number. */
+int ff_most_halvings(uint32_t rays);
+
+/* Sets job->halvings by what was gathered: rows that carry less light than others cast fewer
+ * rays. O(pairs seen). 0, or -1 and e. */
+int ff_share_rays(struct ff_job *j, struct err *e);
 
 /* Casts ff_gather_rays rays from every element-side that is modelled and no ideal mirror or
  * pane, jointly stratified over its area and hemisphere, into j->gather; adds to *rays.

@@ -24,7 +24,9 @@
 #define PI 3.14159265358979323846
 
 enum {
-	MIN_LOBE_RAYS = 64,   /* for any one link and lobe */
+	MIN_LOBE_RAYS = 16, MIN_EMITTER_RAYS = 64, /* for any one link and lobe */
+	BIN_RAYS = 64,
+	EMITTER_LANDINGS = 16, FEW_LOBES = 256, /* see cluster_rays */
 	CLUSTER_SHARE = 128,  /* sources are joined up to one CLUSTER_SHARE-th of the rays */
 	PROBES = 4,           /* point pairs tried for emitters that no ray met */
 	BIN_RINGS = 3, BIN_SECTORS = 8
@@ -116,15 +118,22 @@ static int probe(struct ff_thread *t, uint32_t ps, uint32_t source, uint32_t beg
 
 /* Tries a few straight lines from the patch-side to every emitter that none of its
  * rays met by chain 0: a small lamp far away may well be missed, yet its highlight is
- * what is seen. O(emitters). */
-static int probe_unseen(struct ff_thread *t, uint32_t ps, const uint8_t *met, struct err *e)
+ * what is seen. `all`: what the rays' captures weigh. O(emitters). */
+static int probe_unseen(struct ff_thread *t, uint32_t ps, const uint8_t *met, double all,
+                        struct err *e)
 {
 	const struct ff_job *j = t->job;
 
-	for (uint32_t q = 0; q < 2 * j->m->patches; q++)
-		if (!met[q] && j->emits[q] && q >> 1 != ps >> 1 &&
-		    probe(t, ps, q, 0, PROBES, &t->captures, e))
+	for (uint32_t q = 0; q < 2 * j->m->patches; q++) {
+		size_t before = t->captures.n;
+		if (met[q] || !j->emits[q] || q >> 1 == ps >> 1)
+			continue;
+		if (probe(t, ps, q, 0, PROBES, &t->captures, e))
 			return -1;
+		for (size_t i = before; i < t->captures.n; i++)
+			((struct capture *)t->captures.data)[i].w *=
+				all * j->m->patch_area[q >> 1] / (PI * PROBES);
+	}
 	return 0;
 }
 
@@ -341,7 +350,7 @@ static int bin_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct 
 				bad = vec_append(&bin, &c[i], 1, sizeof c[i], e);
 		}
 		if (!bad && bin.n)
-			bad = put_link(t, ps, bin.data, bin.n, MIN_LOBE_RAYS, cast, b, e);
+			bad = put_link(t, ps, bin.data, bin.n, BIN_RAYS, cast, b, e);
 	}
 	free(bin.data);
 	return bad;
@@ -371,16 +380,25 @@ static size_t cluster_end(const struct ff_job *j, const struct capture *c, size_
 	return end;
 }
 
-/* Rays for the rows of a cluster: emitters, whose highlights are what is seen, share
- * emitter_gain times what the others do. */
-static uint32_t cluster_rays(const struct ff_job *j, const struct capture *c, double share,
-                             size_t emitters)
+/* Rays for the rows of a cluster that is `share` of what the patch-side sees. Emitters, whose
+ * light is brightest, share emitter_gain times what the others do, but each gets no more than
+ * EMITTER_LANDINGS times what its own row would send here of as many: where it is small or
+ * far, its light on the patch-side is a small part of what it gives. Lobes that are few are
+ * all that evens out one another's noise, so they get more. */
+static uint32_t cluster_rays(const struct ff_job *j, uint32_t ps, const struct capture *c,
+                             double share, size_t emitters)
 {
-	double rays = ff_emits(j, c->source)
-	            ? (double)j->o.lobe_rays * j->o.emitter_gain / (double)emitters
-	            : fmin(1, share) * j->o.lobe_rays;
+	double rays = share * j->o.lobe_rays, least = MIN_LOBE_RAYS;
 
-	return rays > MIN_LOBE_RAYS ? (uint32_t)rays : MIN_LOBE_RAYS;
+	if (ff_emits(j, c->source)) {
+		double all = (double)j->o.lobe_rays * j->o.emitter_gain;
+		double lands = is_light(j, c->source) ? 1
+		             : share * j->m->patch_area[ps >> 1] / j->m->patch_area[c->source >> 1];
+		lands *= EMITTER_LANDINGS * fmax(1, FEW_LOBES / (double)j->lobes);
+		rays = all * fmin(1. / (double)emitters, lands);
+		least = MIN_EMITTER_RAYS;
+	}
+	return (uint32_t)fmax(least, fmin(rays, UINT32_MAX));
 }
 
 /* Emitters, by chain, among sorted captures. */
@@ -410,7 +428,7 @@ int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch
 		if (c[i].chain == 0)
 			met[c[i].source] = 1;
 	}
-	bad = bad || probe_unseen(t, ps, met, e) || ff_light_captures(t, ps, e) ||
+	bad = bad || probe_unseen(t, ps, met, all, e) || ff_light_captures(t, ps, e) ||
 	      sort_captures(t, e);
 	free(met);
 	c = t->captures.data;
@@ -419,7 +437,8 @@ int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch
 	for (size_t i = 0, end; !bad && i < t->captures.n; i = end) {
 		double w = 0;
 		end = cluster_end(j, c, i, t->captures.n, all / CLUSTER_SHARE, &w);
-		uint32_t rays = cluster_rays(j, &c[i], all > 0 ? w / all : 0, emitters);
+		double share = all > 0 ? fmin(1, w / all) : 0;
+		uint32_t rays = cluster_rays(j, ps, &c[i], share, emitters);
 		size_t many = end - i;
 		const struct capture *of = &c[i];
 		if (j->o.centroid)

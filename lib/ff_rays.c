@@ -377,7 +377,7 @@ static void cast_lobe_ray(struct ff_thread *t, const struct capture *c, int side
 static struct ff_weight diffuse(struct ff_thread *t, uint32_t ps)
 {
 	const struct ff_job *j = t->job;
-	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
+	uint32_t rays = ff_row_rays(j, ps);
 	struct ff_weight w = { rays, rays };
 	int gathered = j->gather.rays && j->shoots_diffuse[ps];
 	int alone = gathered && ff_row_is_gathered(j, ps);
@@ -426,7 +426,6 @@ static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struc
 {
 	const struct ff_job *j = t->job;
 	uint32_t material = model_patch_material(j->m, ps >> 1);
-	uint32_t rays = j->o.rays * (j->emits[ps] ? j->o.emitter_gain : 1);
 
 	t->rng = rng_seed(j->o.seed, ps);
 	t->captures.n = 0;
@@ -439,6 +438,7 @@ static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struc
 		batch_free(&unused);
 	}
 	if (j->shoots_lobe[ps]) {
+		uint32_t rays = ff_row_rays(j, ps);
 		t->lobe_depth = j->o.lobe_depth;
 		cast(t, ps, rays, j->m->material.emission_exponent[2 * material + (ps & 1)], 0);
 		t->lobe_depth = 0;

@@ -8,6 +8,20 @@
 
 #define PI 3.14159265358979323846
 
+/* From the centre of a triangle to its farthest corner, by the edges from one corner. */
+static double reach(const double a[4], const double b[4])
+{
+	double far = 0;
+
+	for (int i = 0; i < 3; i++) {
+		double s = i == 1 ? 2 : -1, t = i == 2 ? 2 : -1, d[3];
+		for (int k = 0; k < 3; k++)
+			d[k] = (s * a[k] + t * b[k]) / 3;
+		far = fmax(far, v3_length(d));
+	}
+	return far;
+}
+
 static void fill_element(const struct ff_job *j, uint32_t i)
 {
 	const struct model *m = j->m;
@@ -23,6 +37,7 @@ static void fill_element(const struct ff_job *j, uint32_t i)
 	v3_frame(normal, tangent[0], tangent[1]);
 	for (int k = 0; k < 2; k++)
 		v3_sub(&m->vertex[3 * (size_t)c[k + 1]], a, el->edge[k]);
+	el->size = fmax(sqrt(m->element_area[i]), reach(el->edge[0], el->edge[1]));
 	for (int k = 0; k < 3; k++) {
 		el->corner[k] = a[k] + inset / 3 * (el->edge[0][k] + el->edge[1][k]);
 		el->edge[0][k] *= 1 - inset;
@@ -58,9 +73,8 @@ void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3])
 		n[k] = s * j->m->element_normal[3 * (size_t)element + (size_t)k];
 }
 
-/* The element of a patch that a number in [0,1) chooses by area; what is left of the
- * number, again uniform, replaces it. Binary search without branches to mispredict. */
-static uint32_t choose(const struct ff_job *j, uint32_t patch, double *u)
+/* Binary search without branches to mispredict. */
+uint32_t ff_choose(const struct ff_job *j, uint32_t patch, double *u)
 {
 	uint32_t first = j->m->patch_start[patch], lo = first;
 	uint32_t n = j->m->patch_start[patch + 1] - first;
@@ -78,7 +92,7 @@ static uint32_t choose(const struct ff_job *j, uint32_t patch, double *u)
 
 uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, double x[3])
 {
-	uint32_t i = choose(j, patch, &u0);
+	uint32_t i = ff_choose(j, patch, &u0);
 	const struct ff_element *el = &j->element[i];
 	double r = sqrt(u0), w1 = r * (1 - u1), w2 = r * u1;
 

@@ -1,17 +1,22 @@
 /* What an emitter lights: direct light is the brightest of a picture and the easiest to
  * get right, with pairs of points on the emitter and on each element. */
 #include <math.h>
+#include <string.h>
 
 #include "ff_job.h"
+#include "solid_angle.h"
 #include "vec3.h"
 
 #define PI 3.14159265358979323846
 
 enum { MOST_PAIRS = 1024, PILOT_PAIRS = 64 };
 
-/* Of a close element's rays, if so many may meet the source they are better than pairs of
- * points, whose weights vary as one over the square of their distance. */
+/* Of a close element's rays, if so many may meet the source they are as good as directions
+ * to it, and less work. */
 static const double plenty = .04;
+
+/* Below this solid angle a triangle is far enough for points of it by area, sr. */
+static const double tiny = 1e-4;
 
 /* An element-side is tried for sure if it would be met by one in so many rays; a fainter
  * one by chance, which keeps the expectation. */
@@ -55,7 +60,7 @@ static struct outlook look(const struct ff_job *j, uint32_t source, uint32_t col
 {
 	const double *c = j->gather.centre[source >> 1];
 	double x[3], d[3], nx[3], ny[3], area = j->m->element_area[column >> 1];
-	double size = c[3] + sqrt(area);
+	double size = c[3] + j->element[column >> 1].size;
 
 	point_on(&j->element[column >> 1], 4. / 9, .5, x);
 	ff_normal(j, column >> 1, (int)(column & 1), nx);
@@ -142,15 +147,55 @@ static double draw_pair(const struct ff_job *j, uint32_t source, uint32_t column
 	return k;
 }
 
+/* The same, close to: a direction from the point of the element, uniform by the solid angle
+ * of one of the source's triangles, that is chosen by area. The weight is that angle times
+ * the cosine, where that of points by area has no bound as they meet. y is where the
+ * direction meets the triangle. */
+static double draw_direction(const struct ff_job *j, uint32_t source, uint32_t column,
+                             uint32_t i, uint64_t seed, double x[3], double y[3])
+{
+	double u[2] = { rng_sobol(i, 0, seed), rng_sobol(i, 1, seed) };
+	const struct ff_element *to = &j->element[ff_choose(j, source >> 1, &u[0])];
+	double corner[9], nx[3], ny[3], dir[3], off[3], k = 0;
+
+	point_on(&j->element[column >> 1], rng_sobol(i, 2, seed), rng_sobol(i, 3, seed), x);
+	ff_normal(j, column >> 1, (int)(column & 1), nx);
+	ff_normal(j, (uint32_t)(to - j->element), (int)(source & 1), ny);
+	v3_sub(x, to->corner, off);
+	for (int c = 0; c < 3; c++) {
+		corner[c] = to->corner[c];
+		corner[3 + c] = to->corner[c] + to->edge[0][c];
+		corner[6 + c] = to->corner[c] + to->edge[1][c];
+	}
+	double height = v3_dot(off, ny), angle = height > 0 ? triangle_angle(corner, x) : 0;
+	if (angle > tiny) {
+		triangle_direction(corner, x, angle, u, dir);
+		double fall = -v3_dot(dir, ny);
+		k = fall > 0 ? fmax(0, v3_dot(dir, nx)) * angle * to->per_area / PI : 0;
+		memcpy(y, x, sizeof ny);
+		v3_mad(y, k > 0 ? height / fall : 0, dir, y);
+	} else if (angle > 0) {
+		point_on(to, u[0], u[1], y);
+		k = kernel(x, nx, y, ny);
+	}
+	ray_leave(j->rays, nx, x);
+	ray_leave(j->rays, ny, y);
+	return k;
+}
+
+typedef double draw_fn(const struct ff_job *j, uint32_t source, uint32_t column, uint32_t i,
+                       uint64_t seed, double x[3], double y[3]);
+
 /* F[source -> element-side] by n pairs of points. */
-static struct ff_sight by_pairs(struct ff_thread *t, uint32_t source, uint32_t column, uint32_t n)
+static struct ff_sight by_pairs(struct ff_thread *t, uint32_t source, uint32_t column,
+                                uint32_t n, draw_fn *draw)
 {
 	const struct ff_job *j = t->job;
 	double area = j->m->element_area[column >> 1], sum = 0, squares = 0, x[3], y[3];
 	uint64_t seed = pair_seed(j, 2, source, column);
 
 	for (uint32_t i = 0; i < n; i++) {
-		double k = draw_pair(j, source, column, i, seed, x, y);
+		double k = draw(j, source, column, i, seed, x, y);
 		if (!(k > 0))
 			continue;
 		t->rays++;
@@ -171,7 +216,7 @@ static double unhidden(const struct ff_job *j, uint32_t source, uint32_t column)
 	double sum = 0, x[3], y[3];
 
 	for (uint32_t i = 0; i < PILOT_PAIRS; i++)
-		sum += draw_pair(j, source, column, i, seed, x, y);
+		sum += draw_direction(j, source, column, i, seed, x, y);
 	return j->m->patch_area[source >> 1] * sum / PILOT_PAIRS;
 }
 
@@ -181,7 +226,7 @@ static struct ff_sight see_close(struct ff_thread *t, uint32_t source, uint32_t 
 	if (!faces(t->job, source, column))
 		return (struct ff_sight){ 0 };
 	return unhidden(t->job, source, column) > plenty ? by_rays(t, source, column)
-	                                                 : by_pairs(t, source, column, MOST_PAIRS);
+	                                                 : by_pairs(t, source, column, MOST_PAIRS, draw_direction);
 }
 
 /* An element-side's sight of the source, to be trusted as far as `rays` rays of the row;
@@ -207,7 +252,7 @@ static struct ff_sight sight(struct ff_thread *t, uint32_t source, uint32_t colu
 		return s;
 	while (n < MOST_PAIRS && n < o.want)
 		n *= 2;
-	s = by_pairs(t, source, column, n);
+	s = by_pairs(t, source, column, n, draw_pair);
 	s.variance = s.variance / (odds * odds) + s.w * s.w * (1 / odds - 1) / odds;
 	s.w /= odds;
 	return s;

@@ -252,6 +252,7 @@ static int put_arrival(struct ff_batch *b, uint32_t target, const double toward[
 struct finish {
 	uint32_t samples;
 	double total, sum, variance;
+	double even;              /* the variance if the row were one sample */
 };
 
 /* Chain 0 on one patch-side: entries for the elements that were hit, from `place` on.
@@ -276,6 +277,7 @@ static int finish_side(struct tally *t, struct ff_batch *b, uint32_t ps, uint32_
 	}
 	for (int r = 0; r < TALLY_REPLICATES; r++)
 		square += part[r] * part[r];
+	f->even += side_sum / f->total * (1 - side_sum / f->total);
 	f->variance += t->variance[ps] > 0 ? t->variance[ps] / (f->total * f->total)
 	             : share_variance(t, side_sum, square, f->total, f->samples);
 	t->square[ps] = t->replicate[ps] = t->variance[ps] = 0;
@@ -417,15 +419,18 @@ int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
 		return err_set(e, "%s", t->err.text);
 	if (batch_begin(b, e) || finish_near(t, b, &f, e))
 		return -1;
+	f.even += r->escape / total * (1 - r->escape / total);
 	f.variance += share_variance(t, r->escape, t->escape_square, total, samples);
 	f.sum += r->escape + r->black + r->lost + r->cut;
 	if (t->arrival.n)
 		qsort(t->arrival.data, t->arrival.n, sizeof(struct tally_arrival), by_target);
 	if (put_block(t, b, 0, e) || finish_far(t, b, e))
 		return -1;
-	clear(t);
 	/* All samples in one place tell no more than a sample's weight. */
 	double error = samples ? fmax(sqrt(f.variance), 1. / samples) : 0;
+	if (t->dependent && t->replicates >= 2 && f.variance > 0)
+		samples = (uint32_t)fmax(1, fmin(samples, f.even / f.variance));
+	clear(t);
 	struct batch_row row = { row_side, kind, samples, f.sum > 0 ? 1 / f.sum : 0,
 	                         1 - f.sum / total, error };
 	return batch_put_row(b, &row, e);

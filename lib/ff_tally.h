@@ -43,6 +43,7 @@ struct tally {
 	double (*toward)[3];       /* [2P] summed directions to where light comes from */
 	double escape_before, escape_square;
 	int replicates;
+	int dependent;             /* samples of a replicate are no independent ones */
 
 	struct tally_far far;      /* longer chains */
 	struct vec rest;           /* struct tally_rest by slot */
@@ -116,7 +117,8 @@ void tally_replicate(struct tally *t);
 /* Appends the row to the batch and clears the tally. total: the weight that was
  * cast, from which the raw residual follows. The standard error comes from the
  * replicates where there are two or more, otherwise it is that of `samples`
- * random samples; none (0) stands for exact values. O(hits + log) . 0, or -1 and e. */
+ * random samples; none (0) stands for exact values. The row says that it is worth `samples`,
+ * or with t->dependent as many independent ones, if fewer, as have that error. O(hits + log) . 0, or -1 and e. */
 int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
                  enum ff_row_kind kind, uint32_t samples, double total, struct err *e);
 
@@ -134,6 +136,11 @@ struct batch_row {
 int batch_begin(struct ff_batch *b, struct err *e);
 int batch_reserve(struct ff_batch *b, size_t values, struct err *e);
 double batch_put_value(struct ff_batch *b, uint32_t column, double value);
+
+/* The same for those of n values x (double, or float unless b->f64) that are above 0, times
+ * `scale`; returns the sum of what is stored. */
+double batch_put_values(struct ff_batch *b, const uint32_t *column, const void *x, size_t n,
+                        double scale);
 int batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *rest,
                     struct err *e);
 int batch_put_row(struct ff_batch *b, const struct batch_row *r, struct err *e);

@@ -14,6 +14,7 @@ enum { LANES = 4, CHANNELS_MAX = 384, VECTORS_MAX = CHANNELS_MAX / LANES };
 
 typedef double lanes __attribute__((vector_size(32)));
 typedef float lanes_f32 __attribute__((vector_size(16)));
+typedef long long lanes_mask __attribute__((vector_size(32)));
 
 /* Vectors that hold so many channels. */
 static inline size_t lanes_vectors(size_t channels)
@@ -21,12 +22,14 @@ static inline size_t lanes_vectors(size_t channels)
 	return (channels + LANES - 1) / LANES;
 }
 
-/* n zeroed vectors, aligned as such; *room is what to free. NULL and e when out of
+/* n zeroed vectors, aligned to lines of the cache; *room is what to free. NULL and e when out of
  * memory. */
 static inline lanes *lanes_new(size_t n, void **room, const char *what, struct err *e)
 {
-	*room = mem_new(n + 1, sizeof(lanes), what, e); /* calloc aligns to 16 bytes only */
-	return *room ? (lanes *)(((uintptr_t)*room + 31) & ~(uintptr_t)31) : NULL;
+	enum { LINE = 64 };          /* calloc aligns to 16 bytes only */
+
+	*room = mem_new(n + LINE / sizeof(lanes), sizeof(lanes), what, e);
+	return *room ? (lanes *)(((uintptr_t)*room + LINE - 1) & ~(uintptr_t)(LINE - 1)) : NULL;
 }
 
 /* Rows of n doubles to rows of vectors, padded with what is there (0), and back. */
@@ -57,9 +60,34 @@ static inline double lanes_total(const lanes *x, size_t n)
 
 static inline lanes lanes_abs(lanes x)
 {
-	typedef long long bits __attribute__((vector_size(32)));
+	return (lanes)((lanes_mask)x & INT64_MAX);
+}
 
-	return (lanes)((bits)x & INT64_MAX);
+/* x, or 0 where not `yes`, without a branch. */
+static inline lanes lanes_if(lanes x, int yes)
+{
+	return (lanes)((lanes_mask)x & -(long long)yes);
+}
+
+static inline lanes lanes_all(double x)
+{
+	return (lanes){ x, x, x, x };
+}
+
+/* Lanes of a where the mask that a comparison gave is set, else those of b. */
+static inline lanes lanes_choose(lanes_mask mask, lanes a, lanes b)
+{
+	return (lanes)((mask & (lanes_mask)a) | (~mask & (lanes_mask)b));
+}
+
+static inline lanes lanes_min(lanes a, lanes b)
+{
+	return lanes_choose(a < b, a, b);
+}
+
+static inline lanes lanes_max(lanes a, lanes b)
+{
+	return lanes_choose(a > b, a, b);
 }
 
 /* Sum of the absolute values of n vectors. */

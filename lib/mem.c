@@ -1,8 +1,33 @@
+#define _DEFAULT_SOURCE
 #include "mem.h"
 
+#include <malloc.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
+
+enum { LARGE_PAGE = 2 << 20, HEAP = 24 << 20, OWN_MAPPING = 32 << 20 };
+
+/* Asks for large pages where they fit in between p and p + bytes, not touched yet. */
+static void use_large_pages(void *p, size_t bytes)
+{
+	uintptr_t begin = ((uintptr_t)p + LARGE_PAGE - 1) & ~(uintptr_t)(LARGE_PAGE - 1);
+	uintptr_t end = ((uintptr_t)p + bytes) & ~(uintptr_t)(LARGE_PAGE - 1);
+
+	if (begin < end)
+		madvise((void *)begin, end - begin, MADV_HUGEPAGE);
+}
+
+void mem_keep(void)
+{
+	mallopt(M_MMAP_THRESHOLD, OWN_MAPPING);
+	mallopt(M_TRIM_THRESHOLD, 2 * HEAP);
+	void *heap = malloc(HEAP);
+	if (heap)
+		use_large_pages(heap, HEAP);
+	free(heap);
+}
 
 void *mem_new(size_t n, size_t size, const char *what, struct err *e)
 {

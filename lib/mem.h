@@ -6,6 +6,11 @@
 
 #include "err.h"
 
+/* For programs, at their start: memory that is freed is kept for what is allocated next, and
+ * the heap begins with large pages. Else the system's work on pages is a fifth of what a
+ * small scene takes. */
+void mem_keep(void);
+
 /* Zeroed array of n elements of `size` bytes (never NULL for n = 0), to be
  * released with free(). NULL and an error naming `what` when the product
  * overflows or memory is short. */

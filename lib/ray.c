@@ -40,6 +40,10 @@ static const double offset_units = 0x1p-21;
  * one; in larger scenes its rays part too soon. */
 enum { COHERENT_MOST = 1000 };
 
+/* Up to how many triangles a scene is built by one thread, in hundredths of a second: Embree's
+ * others would go on looking for work for longer. */
+enum { ALONE_MOST = 20000 };
+
 enum { TRIANGLES, SLIVERS };  /* geometries */
 
 /* length^2 / height, at unit scale, beyond which a triangle is a sliver: half of the offset
@@ -195,7 +199,7 @@ struct ray_scene *ray_scene_new(const struct model *m, struct err *e)
 	bounds(m, s);
 	s->coherent = m->triangles <= COHERENT_MOST;
 	s->normal = mem_new(m->triangles, sizeof *s->normal, "triangle normals", e);
-	s->device = rtcNewDevice(NULL);
+	s->device = rtcNewDevice(m->triangles <= ALONE_MOST ? "threads=1" : NULL);
 	if (s->normal && s->device) {
 		s->scene = rtcNewScene(s->device);
 		rtcSetSceneFlags(s->scene, RTC_SCENE_FLAG_ROBUST);

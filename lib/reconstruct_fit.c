@@ -18,12 +18,12 @@ struct fit {
 	double variance;          /* of the value at the vertex over that of an element */
 };
 
-/* What one channel (side and column) of a list of elements looks like to a fit. */
-struct channel {
-	double value;             /* of the fit at the vertex */
-	double gx, gy, mean;
-	double low, high;         /* range over the elements at the vertex */
-	double slack;             /* how far beyond it the fit may go */
+/* What a vector of channels of a list of elements looks like to a fit. */
+struct channels {
+	lanes value;              /* of the fit at the vertex */
+	lanes gx, gy, mean;
+	lanes low, high;          /* range over the elements at the vertex */
+	lanes slack;              /* how far beyond it the fit may go */
 };
 
 /* Area-weighted normal of the group; 0 when it has none to speak of. */
@@ -32,9 +32,9 @@ static int group_normal(const struct reconstruct_job *j, size_t group, double n[
 	memset(n, 0, 3 * sizeof *n);
 	double area = 0;
 	for (uint32_t i = j->g.start[group]; i < j->g.start[group + 1]; i++) {
-		uint32_t e = j->g.corner[i] / 3;
-		v3_mad(n, j->m->element_area[e], &j->m->element_normal[3 * (size_t)e], n);
-		area += j->m->element_area[e];
+		const struct reconstruct_place *p = &j->place[j->g.corner[i] / 3];
+		v3_mad(n, p->area, p->normal, n);
+		area += p->area;
 	}
 	return v3_normalise(n) > .1 * area && area > 0;
 }
@@ -42,11 +42,12 @@ static int group_normal(const struct reconstruct_job *j, size_t group, double n[
 static void list_group(const struct reconstruct_job *j, struct reconstruct_scratch *s, size_t group,
                        size_t *n)
 {
+	s->met[group] = (uint32_t)group + 1;
 	for (uint32_t i = j->g.start[group]; i < j->g.start[group + 1]; i++) {
 		uint32_t e = j->g.corner[i] / 3;
-		if (s->stamp[e] == (uint32_t)group + 1)
+		if (s->listed[e] == (uint32_t)group + 1)
 			continue;
-		s->stamp[e] = (uint32_t)group + 1;
+		s->listed[e] = (uint32_t)group + 1;
 		s->near[(*n)++] = (struct reconstruct_near){ .element = e };
 	}
 }
@@ -61,43 +62,36 @@ static size_t add_ring(const struct reconstruct_job *j, struct reconstruct_scrat
 	for (size_t i = begin; i < end; i++)
 		for (size_t k = 0; k < 3; k++) {
 			uint32_t c = j->g.group[3 * (size_t)s->near[i].element + k];
+			if (s->met[c] == (uint32_t)group + 1)
+				continue;
+			s->met[c] = (uint32_t)group + 1;
 			for (uint32_t q = j->g.start[c]; q < j->g.start[c + 1]; q++) {
 				uint32_t e = j->g.corner[q] / 3;
 				if (n - end >= NEAR_MAX || seen++ >= SEEN_MAX)
 					return n - end;
-				if (s->stamp[e] == (uint32_t)group + 1 ||
-				    v3_dot(normal, &j->m->element_normal[3 * (size_t)e]) <
-				        COS_CREASE)
+				if (s->listed[e] == (uint32_t)group + 1 ||
+				    v3_dot(normal, j->place[e].normal) < COS_CREASE)
 					continue;
-				s->stamp[e] = (uint32_t)group + 1;
+				s->listed[e] = (uint32_t)group + 1;
 				s->near[n++] = (struct reconstruct_near){ .element = e };
 			}
 		}
 	return n - end;
 }
 
-/* Coordinates and weights of the listed elements about vertex v. */
-static double place(const struct reconstruct_job *j, struct reconstruct_scratch *s, size_t n,
-                    uint32_t v, const double normal[3])
+/* Coordinates of the elements listed from `begin` on about a vertex, in the tangent plane
+ * of t and b. */
+static void place(const struct reconstruct_job *j, struct reconstruct_scratch *s, size_t begin, size_t end,
+                  const double vertex[3], const double t[3], const double b[3])
 {
-	const struct model *m = j->m;
-	double t[3], b[3], sum = 0;
-
-	v3_frame(normal, t, b);
-	for (size_t i = 0; i < n; i++) {
+	for (size_t i = begin; i < end; i++) {
 		struct reconstruct_near *p = &s->near[i];
-		double c[3] = { 0, 0, 0 };
-		for (size_t k = 0; k < 3; k++)
-			v3_mad(c, 1. / 3, &m->vertex[3 * (size_t)m->element[3 * (size_t)p->element + k]], c);
-		v3_sub(c, &m->vertex[3 * (size_t)v], c);
-		p->x = v3_dot(c, t);
-		p->y = v3_dot(c, b);
-		p->w = m->element_area[p->element];
-		sum += p->w;
+		double d[3];
+		v3_sub(j->place[p->element].centre, vertex, d);
+		p->x = v3_dot(d, t);
+		p->y = v3_dot(d, b);
+		p->area = j->place[p->element].area;
 	}
-	for (size_t i = 0; i < n && sum > 0; i++)
-		s->near[i].w /= sum;
-	return sum;
 }
 
 /* Prepares the least-squares fit over the listed elements. The prediction at the
@@ -106,12 +100,16 @@ static double place(const struct reconstruct_job *j, struct reconstruct_scratch 
  * Applied Regression Analysis, sec. 1.4, with weights). */
 static void prepare(const struct reconstruct_scratch *s, struct fit *f)
 {
-	double xx = 0, xy = 0, yy = 0, w2 = 0;
+	double xx = 0, xy = 0, yy = 0, w2 = 0, sum = 0;
 
 	f->mx = f->my = 0;
+	for (size_t i = 0; i < f->n; i++)
+		sum += s->near[i].area;
 	for (size_t i = 0; i < f->n; i++) {
-		f->mx += s->near[i].w * s->near[i].x;
-		f->my += s->near[i].w * s->near[i].y;
+		struct reconstruct_near *p = &s->near[i];
+		p->w = p->area * (1 / sum);
+		f->mx += p->w * p->x;
+		f->my += p->w * p->y;
 	}
 	for (size_t i = 0; i < f->n; i++) {
 		double w = s->near[i].w, x = s->near[i].x - f->mx, y = s->near[i].y - f->my;
@@ -131,123 +129,144 @@ static void prepare(const struct reconstruct_scratch *s, struct fit *f)
 	                    f->iyy * f->my * f->my);
 }
 
-/* Fits one channel. Slack: the range of the fitted elements times how much of
- * their variation a linear function explains, 0 from a quarter unexplained. */
-static struct channel fit_channel(const struct reconstruct_job *j, const struct reconstruct_scratch *s,
-                                  const struct fit *f, size_t channel)
+static inline lanes clamp(lanes x, lanes low, lanes high)
 {
-	struct channel c = { .low = (double)INFINITY };
-	double cx = 0, cy = 0, variance = 0, low = (double)INFINITY, high = 0;
+	return lanes_min(lanes_max(x, low), high);
+}
+
+/* Vector v of the means of listed element i. */
+static inline lanes mean_of(const struct reconstruct_job *j, const struct reconstruct_scratch *s, size_t i,
+                            size_t v)
+{
+	return j->h[s->near[i].element * j->vectors + v];
+}
+
+/* Fits a vector of channels. Slack: the range of the fitted elements times how much of
+ * their variation a linear function explains, 0 from a quarter unexplained. */
+static inline struct channels fit_channels(const struct reconstruct_job *j,
+                                           const struct reconstruct_scratch *s, const struct fit *f,
+                                           size_t v)
+{
+	const lanes none = { 0 };
+	lanes low = lanes_all((double)INFINITY), high = none, cx = none, cy = none, variance = none;
+	struct channels c = { .mean = none, .slack = none };
 
 	for (size_t i = 0; i < f->n; i++) {
-		double h = reconstruct_mean(j, s->near[i].element, channel);
+		lanes h = mean_of(j, s, i, v);
 		c.mean += s->near[i].w * h;
-		low = fmin(low, h);
-		high = fmax(high, h);
+		low = lanes_min(low, h);
+		high = lanes_max(high, h);
 		if (i + 1 == f->ring1)
 			c.low = low, c.high = high;
 	}
 	for (size_t i = 0; i < f->n; i++) {
-		double d = reconstruct_mean(j, s->near[i].element, channel) - c.mean;
-		cx += s->near[i].w * d * (s->near[i].x - f->mx);
-		cy += s->near[i].w * d * (s->near[i].y - f->my);
-		variance += s->near[i].w * d * d;
+		const struct reconstruct_near *p = &s->near[i];
+		lanes d = mean_of(j, s, i, v) - c.mean, wd = p->w * d;
+		cx += wd * (p->x - f->mx);
+		cy += wd * (p->y - f->my);
+		variance += wd * d;
 	}
 	c.gx = f->ixx * cx + f->ixy * cy;
 	c.gy = f->ixy * cx + f->iyy * cy;
 	c.value = c.mean - c.gx * f->mx - c.gy * f->my;
-	if (f->n > 3 && variance > 0) {
-		double left = 1 - (c.gx * cx + c.gy * cy) / variance;
-		left *= (double)(f->n - 1) / (double)(f->n - 3);
-		c.slack = fmax(0, fmin(1, 1 - 4 * left)) * (high - low);
+	if (f->n > 3) {
+		double free = (double)(f->n - 1) / (double)(f->n - 3);
+		lanes left = free * (1 - (c.gx * cx + c.gy * cy) / variance);
+		lanes part = clamp(1 - 4 * left, none, lanes_all(1));
+		c.slack = lanes_choose(variance > 0, part * (high - low), none);
 	}
 	return c;
 }
 
-static double clamped(const struct channel *c)
+static inline lanes clamped(const struct channels *c)
 {
-	if (c->high <= 0)
-		return 0;
-	return fmin(fmax(c->value, fmax(0, c->low - c->slack)), c->high + c->slack);
+	const lanes none = { 0 };
+	lanes value = clamp(c->value, lanes_max(none, c->low - c->slack), c->high + c->slack);
+
+	return lanes_choose(c->high > 0, value, none);
 }
 
 /* How far a fit is consistent with the elements' standard errors: 1 where its
  * chi-square per degree of freedom is at most 1, falling to 0 at 2. */
-static double consistency(const struct reconstruct_job *j, const struct reconstruct_scratch *s,
-                          const struct fit *f, const struct channel *c, size_t channel)
+static inline lanes consistency(const struct reconstruct_job *j, const struct reconstruct_scratch *s,
+                                const struct fit *f, const struct channels *c, size_t v)
 {
-	size_t channels = 2 * (size_t)j->columns;
-	double chi2 = 0;
+	const lanes none = { 0 };
+	lanes chi2 = none;
 
 	if (f->n <= 3)
-		return 0;
+		return none;
 	for (size_t i = 0; i < f->n; i++) {
 		const struct reconstruct_near *p = &s->near[i];
-		double error = j->error[p->element * channels + channel];
-		double d = reconstruct_mean(j, p->element, channel) - c->mean - c->gx * (p->x - f->mx) -
-		           c->gy * (p->y - f->my);
-		if (d == 0)
-			continue;
-		if (!(error > 0))
-			return 0;
-		chi2 += d * d / (error * error);
+		lanes d = mean_of(j, s, i, v) - c->mean - c->gx * (p->x - f->mx) -
+		          c->gy * (p->y - f->my);
+		chi2 += d * d * j->precision[p->element * j->vectors + v];
 	}
-	return fmax(0, fmin(1, 2 - chi2 / (double)(f->n - 3)));
+	return clamp(2 - chi2 / (double)(f->n - 3), none, lanes_all(1));
 }
 
-/* Area-weighted mean of the elements at the vertex: what is left without a fit. */
+/* Area-weighted mean of the n elements at the vertex: what is left without a fit. */
 static void average(const struct reconstruct_job *j, const struct reconstruct_scratch *s, size_t n,
-                    double sum, size_t channels, double *value)
+                    size_t vectors, lanes *value)
 {
-	for (size_t c = 0; c < channels; c++) {
-		value[c] = 0;
-		for (size_t i = 0; i < n; i++)
-			value[c] += (sum > 0 ? s->near[i].w : 1. / (double)n) *
-			            reconstruct_mean(j, s->near[i].element, c);
+	double sum = 0;
+
+	for (size_t i = 0; i < n; i++)
+		sum += s->near[i].area;
+	memset(value, 0, vectors * sizeof *value);
+	for (size_t i = 0; i < n; i++) {
+		double w = sum > 0 ? s->near[i].area / sum : 1. / (double)n;
+		for (size_t v = 0; v < vectors; v++)
+			value[v] += w * mean_of(j, s, i, v);
 	}
+}
+
+/* Vectors that the sides modelled of a group's elements fill. */
+static size_t group_vectors(const struct reconstruct_job *j, uint32_t element)
+{
+	int two = j->sides == 2 && model_side_modelled(j->m, 2 * j->m->element_patch[element] + BACK);
+
+	return lanes_vectors((size_t)j->columns << two);
 }
 
 /* Values at the vertex of a group. */
 static void solve_group(const struct reconstruct_job *j, struct reconstruct_scratch *s, size_t group)
 {
-	uint32_t corner = j->g.corner[j->g.start[group]], vertex = j->m->element[corner];
-	uint32_t side = 2 * j->m->element_patch[corner / 3];
-	size_t sides = model_side_modelled(j->m, side + BACK) ? 2 : 1, begin = 0;
-	size_t channels = sides * (size_t)j->columns;
-	double *value = j->value + 2 * group * (size_t)j->columns;
+	uint32_t corner = j->g.corner[j->g.start[group]];
+	const double *vertex = &j->m->vertex[3 * (size_t)j->m->element[corner]];
+	size_t vectors = group_vectors(j, corner / 3), begin = 0;
+	lanes *value = j->value + group * j->vectors;
 	struct fit f = { 0 };
-	double normal[3];
+	double normal[3], t[3], b[3];
 	int facing = group_normal(j, group, normal);
 
+	v3_frame(normal, t, b);
 	list_group(j, s, group, &f.n);
 	f.ring1 = f.n;
-	double sum = place(j, s, f.n, vertex, normal);
-	average(j, s, f.n, sum, channels, value);
-	if (!facing)
-		return;
-	prepare(s, &f);
-	for (int ring = 1; ring <= RINGS; ring++) {
+	place(j, s, 0, f.n, vertex, t, b);
+	for (int ring = 1; ring <= RINGS && facing; ring++) {
+		prepare(s, &f);
 		int good = f.variance <= accepted_variance;
-		for (size_t c = 0; c < channels && good; c++) {
-			struct channel t = fit_channel(j, s, &f, c);
-			value[c] = clamped(&t);
+		for (size_t v = 0; v < vectors && good; v++) {
+			struct channels c = fit_channels(j, s, &f, v);
+			value[v] = clamped(&c);
 		}
-		if (good && !j->error)
+		if (good && !j->precision)
 			return;
 		size_t more = add_ring(j, s, group, normal, begin, f.n);
 		begin = f.n;
 		f.n += more;
-		place(j, s, f.n, vertex, normal);
-		prepare(s, &f);
+		place(j, s, begin, f.n, vertex, t, b);
 		if (!good)
 			continue;
-		for (size_t c = 0; c < channels && f.variance <= accepted_variance; c++) {
-			struct channel t = fit_channel(j, s, &f, c);
-			double b = consistency(j, s, &f, &t, c);
-			value[c] += b * (clamped(&t) - value[c]);
+		prepare(s, &f);
+		for (size_t v = 0; v < vectors && f.variance <= accepted_variance; v++) {
+			struct channels c = fit_channels(j, s, &f, v);
+			value[v] += consistency(j, s, &f, &c, v) * (clamped(&c) - value[v]);
 		}
 		return;
 	}
+	average(j, s, f.ring1, vectors, value);
 }
 
 void reconstruct_fit(void *arg, size_t begin, size_t end, int thread)

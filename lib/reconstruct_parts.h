@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "lanes.h"
 #include "model.h"
 #include "reconstruct.h"
 #include "smooth.h"
@@ -19,37 +20,43 @@ enum {
 	SEEN_MAX = 4096 /* corners that may be looked at for it */
 };
 
+/* Where an element is. */
+struct reconstruct_place {
+	double centre[3], normal[3], area;
+};
+
 struct reconstruct_near {
 	uint32_t element;
+	double area;
 	double x, y, w;           /* tangent coordinates; weights sum to 1 */
 };
 
 struct reconstruct_scratch {
-	uint32_t *stamp;          /* [elements] group + 1 that last listed it */
+	uint32_t *listed;         /* [elements] group + 1 that last listed it */
+	uint32_t *met;            /* [groups] group + 1 that last looked at its elements */
 	struct reconstruct_near *near;
 };
 
+/* A row of channels, in vectors: those of the front, then of the back. Of each side the
+ * bands; twice where light straight from emitters and other light are interpolated apart:
+ * one has edges and little noise, the other noise and few edges. */
 struct reconstruct_job {
 	const struct model *m;
 	const struct solution *s;
 	struct smooth_groups g;
-	int columns;              /* bands, twice where light straight from emitters and other
-	                             light are interpolated apart: one has edges and little
-	                             noise, the other noise and few edges */
-	double *h;                /* [2 elements][columns] */
-	double *error;            /* of them, or NULL */
-	double *value;            /* [groups][2 sides][columns] at the vertices */
-	double *rest;             /* [2 elements][columns] what their means still miss */
-	double *shift;            /* [groups][2 sides][columns] */
+	int sides;                /* 1 where no back is modelled */
+	int columns;              /* channels of a side */
+	size_t vectors;           /* of a row */
+	struct reconstruct_place *place; /* [elements] */
+	lanes *h;                 /* [elements] rows: their means */
+	lanes *precision;         /* [elements] rows: 1 over their variances, or NULL */
+	lanes *value;             /* [groups] rows at the vertices */
+	lanes *rest;              /* [elements] rows: what their means still miss */
+	lanes *shift;             /* [groups] rows */
+	void *room[5];            /* what holds these */
 	struct reconstruction *out;
 	struct reconstruct_scratch *scratch;  /* one a thread */
 };
-
-/* Irradiance of an element in a channel: a side and a column. */
-static inline double reconstruct_mean(const struct reconstruct_job *j, uint32_t element, size_t channel)
-{
-	return j->h[2 * (size_t)element * (size_t)j->columns + channel];
-}
 
 /* Fits the values at the vertices of groups [begin, end) of a struct reconstruct_job; for par_for. */
 void reconstruct_fit(void *job, size_t begin, size_t end, int thread);

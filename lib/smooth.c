@@ -7,7 +7,8 @@
 
 /* An edge at a vertex, seen from a corner there. */
 struct spoke {
-	uint32_t surface, far, corner;
+	uint64_t edge;            /* its surface, then its far end */
+	uint32_t corner;
 };
 
 struct builder {
@@ -60,14 +61,32 @@ static uint32_t sort_corners(struct builder *b)
 	return most;
 }
 
-static int compare_spokes(const void *pa, const void *pb)
+static int is_after(const struct spoke *a, const struct spoke *b)
 {
-	const struct spoke *a = pa, *b = pb;
-	if (a->surface != b->surface)
-		return a->surface < b->surface ? -1 : 1;
-	if (a->far != b->far)
-		return a->far < b->far ? -1 : 1;
-	return (a->corner > b->corner) - (a->corner < b->corner);
+	return a->edge > b->edge || (a->edge == b->edge && a->corner > b->corner);
+}
+
+static int compare_spokes(const void *a, const void *b)
+{
+	return is_after(a, b) - is_after(b, a);
+}
+
+/* Nearly always a dozen: then by insertion. */
+static void sort_spokes(struct spoke *spoke, size_t n)
+{
+	enum { FEW = 32 };
+
+	if (n > FEW) {
+		qsort(spoke, n, sizeof *spoke, compare_spokes);
+		return;
+	}
+	for (size_t i = 1; i < n; i++) {
+		struct spoke s = spoke[i];
+		size_t at = i;
+		for (; at > 0 && is_after(&spoke[at - 1], &s); at--)
+			spoke[at] = spoke[at - 1];
+		spoke[at] = s;
+	}
 }
 
 static int is_smooth(const struct builder *b, uint32_t c, uint32_t d)
@@ -86,16 +105,15 @@ static void join_at_vertex(struct builder *b, size_t v)
 
 	for (uint32_t i = b->start[v]; i < b->start[v + 1]; i++) {
 		uint32_t c = b->corner[i], first = c - c % 3;
-		uint32_t surface = m->patch_surface[m->element_patch[c / 3]];
+		uint64_t surface = m->patch_surface[m->element_patch[c / 3]];
 		for (uint32_t k = 1; k < 3; k++)
-			b->spoke[n++] = (struct spoke){ surface,
-				m->element[first + (c + k - first) % 3], c };
+			b->spoke[n++] = (struct spoke){
+				surface << 32 | m->element[first + (c + k - first) % 3], c };
 	}
-	qsort(b->spoke, n, sizeof *b->spoke, compare_spokes);
+	sort_spokes(b->spoke, n);
 	for (size_t i = 1; i < n; i++)
 		for (size_t j = i; j-- > 0 && i - j <= SHEETS;) {
-			if (b->spoke[j].surface != b->spoke[i].surface ||
-			    b->spoke[j].far != b->spoke[i].far)
+			if (b->spoke[j].edge != b->spoke[i].edge)
 				break;
 			if (is_smooth(b, b->spoke[j].corner, b->spoke[i].corner))
 				join(b->parent, b->spoke[j].corner, b->spoke[i].corner);

@@ -7,6 +7,7 @@
 
 #include "mem.h"
 #include "rng.h"
+#include "view_layers.h"
 #include "view_path.h"
 #include "view_shade.h"
 
@@ -27,11 +28,6 @@ static const double usual_lobe_error = .05;
 /* Variance of the mean of n samples that are stratified over a pixel over that of samples
  * which are not, divided by sqrt(n). Measured at edges, with 2 to 16 samples. */
 static const double stratified = .2;
-
-/* Planes of the picture by what they hold; -1 = not asked for. */
-struct planes {
-	int bands, diffuse, directional, emission, z, normal, element, patch, error;
-};
 
 /* What a tile adds to the statistics, kept apart so that sums have one order. */
 struct tile_sum {
@@ -55,7 +51,7 @@ struct render {
 	const struct view_frame *f;
 	const struct view_options *o;
 	struct image *picture;
-	struct planes at;
+	struct view_planes at;
 	double (*spot)[2];          /* [samples] positions in the pixel */
 	struct worker *worker;      /* [threads] */
 	struct gather *gather;
@@ -76,74 +72,6 @@ static struct tile tile_at(const struct render *r, size_t t)
 	tile.wide = right < TILE ? right : TILE;
 	tile.pixels = tile.wide * (down < TILE ? down : TILE);
 	return tile;
-}
-
-/* ---- layers ---- */
-
-int view_parse_layers(const char *list, unsigned *layers)
-{
-	static const char *const name[] = { "diffuse", "directional", "emission", "Z", "N",
-		"element", "patch", "error", "all" };
-	enum { NAMES = sizeof name / sizeof *name };
-	unsigned mask = 0;
-
-	for (const char *p = list;; p++) {
-		size_t n = strcspn(p, ","), i = 0;
-		while (i < NAMES && (strlen(name[i]) != n || strncmp(p, name[i], n) != 0))
-			i++;
-		if (i == NAMES)
-			return -1;
-		mask |= i == NAMES - 1 ? (unsigned)VIEW_ALL : 1u << i;
-		p += n;
-		if (!*p)
-			break;
-	}
-	*layers = mask;
-	return 0;
-}
-
-/* Names of the channels in the order of struct planes. */
-struct names {
-	char text[3 * 5 + 3 + 3 + BANDS_MAX][24];
-	int n;
-};
-
-static int add_names(struct names *s, int asked, const char *prefix, const char *const *suffix,
-                     int count)
-{
-	int first = s->n;
-
-	if (!asked)
-		return -1;
-	for (int i = 0; i < count; i++)
-		snprintf(s->text[s->n++], sizeof *s->text, "%s%s", prefix, suffix[i]);
-	return first;
-}
-
-static int new_picture(struct render *r, struct image *picture, struct err *e)
-{
-	static const char *const rgb[] = { "R", "G", "B" }, *const xyz[] = { "X", "Y", "Z" };
-	static const char *const none[] = { "" };
-	unsigned l = r->o->layers;
-	int bands = r->v->m->bands;
-	struct names s = { .n = 0 };
-	const char *list[sizeof s.text / sizeof *s.text];
-
-	add_names(&s, 1, "", rgb, 3);
-	r->at.bands = bands == 1 || bands == 3 ? -1 : s.n;
-	for (int b = 0; b < bands && r->at.bands >= 0; b++)
-		snprintf(s.text[s.n++], sizeof *s.text, "band.%d", b);
-	r->at.diffuse = add_names(&s, l & VIEW_DIFFUSE, "diffuse.", rgb, 3);
-	r->at.directional = add_names(&s, l & VIEW_DIRECTIONAL, "directional.", rgb, 3);
-	r->at.emission = add_names(&s, l & VIEW_EMISSION, "emission.", rgb, 3);
-	r->at.z = add_names(&s, l & VIEW_Z, "Z", none, 1);
-	r->at.normal = add_names(&s, l & VIEW_N, "N.", xyz, 3);
-	r->at.element = add_names(&s, l & VIEW_ELEMENT, "element", none, 1);
-	r->at.patch = add_names(&s, l & VIEW_PATCH, "patch", none, 1);
-	r->at.error = add_names(&s, l & VIEW_ERROR, "error.", rgb, 3);
-	for (int i = 0; i < s.n; i++)
-		list[i] = s.text[i];
-	return image_new(picture, r->f->width, r->f->height, s.n, list, e);
 }
 
 /* ---- rendering ---- */
@@ -495,7 +423,8 @@ int view_render(const struct view_scene *v, const struct view_frame *f,
 	r.across = ((size_t)f->width + TILE - 1) / TILE;
 	tiles = r.across * down;
 	*picture = (struct image){ 0 };
-	if (!new_gather(&r, e) && !new_buffers(&r, tiles, e) && !new_picture(&r, picture, e)) {
+	if (!new_gather(&r, e) && !new_buffers(&r, tiles, e) &&
+	    !view_picture_new(f, o->layers, v->m->bands, &r.at, picture, e)) {
 		if (r.gather)
 			gather(&r, tiles, progress);
 		par_for(tiles, 1, o->threads, trace_tiles, &r, progress);

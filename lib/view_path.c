@@ -130,7 +130,8 @@ static void add_error(struct view_walker *w, const struct view_branch *b, const 
 }
 
 /* What counts of an emitter that a sample of a lobe has met: it may be found by aiming, too. */
-static double aimed_share(const struct view_walker *w, const struct view_branch *b, const struct point *p)
+static double aimed_share(const struct view_walker *w, const struct view_branch *b,
+                          const struct point *p)
 {
 	const struct view_images *s = &w->v->images;
 

@@ -28,7 +28,7 @@ static const struct cli_option option_table[] = {
 	{ OPT_SAMPLES, "samples", "N", "paths in each pixel (default: 64), or particles (1000000)" },
 	{ OPT_CENTRE, "centre", NULL, "sample each pixel at its centre, as trace --samples 1 does" },
 	{ OPT_SEED, "seed", "N", "start of the random numbers (default: 1)" },
-	{ OPT_COMPRESSION, "compression", "METHOD", "zip (default), zips, piz, rle or none" },
+	{ OPT_COMPRESSION, "compression", "METHOD", "auto (default), zip, zips, piz, rle or none" },
 	{ 0, NULL, NULL, NULL }
 };
 
@@ -57,7 +57,7 @@ static void compression(struct reference *r, const char *text)
 	int method = exr_file_compression_by_name(text);
 
 	if (method < 0)
-		cli_usage(&r->cli, "--compression: '%s' is none of zip, zips, piz, rle, none", text);
+		cli_usage(&r->cli, "--compression: '%s' is none of auto, zip, zips, piz, rle, none", text);
 	r->exr.compression = (enum exr_file_compression)method;
 }
 

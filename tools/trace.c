@@ -47,7 +47,7 @@ static const struct cli_option option_table[] = {
 	{ OPT_LAYERS, "layers", "LIST",
 	  "also diffuse,directional,emission,Z,N,element,patch or all" },
 	{ OPT_HALF, "half", NULL, "colours as 16-bit floats" },
-	{ OPT_COMPRESSION, "compression", "METHOD", "zip (default), zips, piz, rle or none" },
+	{ OPT_COMPRESSION, "compression", "METHOD", "auto (default), zip, zips, piz, rle or none" },
 	{ OPT_MIX, "mix", "NAME=X,...",
 	  "scale the light of groups by X, or X:X:X for each band" },
 	{ 0, NULL, NULL, NULL }
@@ -122,7 +122,7 @@ static void compression(struct trace *t, const char *text)
 	int method = exr_file_compression_by_name(text);
 
 	if (method < 0)
-		cli_usage(&t->cli, "--compression: '%s' is none of zip, zips, piz, rle, none", text);
+		cli_usage(&t->cli, "--compression: '%s' is none of auto, zip, zips, piz, rle, none", text);
 	t->exr.compression = (enum exr_file_compression)method;
 }
 

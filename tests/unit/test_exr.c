@@ -16,6 +16,7 @@
 
 #include "../../formats/atomic_file.h"
 #include "../../formats/exr_file.h"
+#include "../../lib/rng.h"
 
 static char directory[] = "/tmp/twopass-exr-XXXXXX";
 
@@ -118,14 +119,53 @@ static void test_round_trip(void **state)
 
 	(void)state;
 	for (size_t s = 0; s < sizeof size / sizeof *size; s++)
-		for (int c = EXR_FILE_ZIP; c <= EXR_FILE_NONE; c++)
+		for (int c = EXR_FILE_AUTO; c <= EXR_FILE_NONE; c++)
 			for (int half = 0; half < 2; half++)
 				round_trip(size[s][0], size[s][1], (enum exr_file_compression)c, half);
+}
+
+/* Bytes of a picture of floats. From row `noisy` on 11 of 12 differ from all others. */
+static size_t size_with_noise(int noisy, enum exr_file_compression compression)
+{
+	enum { WIDTH = 64, HEIGHT = 512 };
+	static const char *const rgb[] = { "R", "G", "B" };
+	struct exr_file_options o = { compression, 0 };
+	struct rng g = rng_seed(1, 0);
+	struct image a, b;
+	struct err e = { 0 };
+	size_t size;
+
+	assert_int_equal(image_new(&a, WIDTH, HEIGHT, 3, rgb, &e), 0);
+	for (int c = 0; c < 3; c++)
+		for (int i = noisy * WIDTH; i < WIDTH * HEIGHT; i++)
+			image_plane(&a, c)[i] = c > 0 || i % 4 ? (float)rng_uniform(&g) : 0;
+	assert_int_equal(exr_file_write(place("a.exr"), &a, NULL, &o, NULL, &e), 0);
+	assert_int_equal(exr_file_read(place("a.exr"), &b, NULL, &e), 0);
+	for (int c = 0; c < 3; c++)
+		assert_memory_equal(image_plane(&a, c), image_plane(&b, image_channel(&b, rgb[c])),
+		                    WIDTH * HEIGHT * sizeof *a.pixel);
+	free(slurp(place("a.exr"), &size));
+	image_free(&a);
+	image_free(&b);
+	return size;
+}
+
+/* What zip makes hardly smaller stays as it is, and the rest is compressed. */
+static void test_auto(void **state)
+{
+	(void)state;
+	size_t zip = size_with_noise(0, EXR_FILE_ZIP), half = size_with_noise(256, EXR_FILE_ZIP);
+
+	assert_true(size_with_noise(0, EXR_FILE_AUTO) > zip * 101 / 100);
+	assert_true(half < zip * 6 / 10);
+	assert_true(size_with_noise(256, EXR_FILE_AUTO) < half * 108 / 100);
+	assert_int_equal(size_with_noise(512, EXR_FILE_AUTO), size_with_noise(512, EXR_FILE_ZIP));
 }
 
 static void test_names(void **state)
 {
 	(void)state;
+	assert_int_equal(exr_file_compression_by_name("auto"), EXR_FILE_AUTO);
 	assert_int_equal(exr_file_compression_by_name("zip"), EXR_FILE_ZIP);
 	assert_int_equal(exr_file_compression_by_name("none"), EXR_FILE_NONE);
 	assert_int_equal(exr_file_compression_by_name("dwaa"), -1);
@@ -521,7 +561,8 @@ static int remove_directory(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_round_trip),   cmocka_unit_test(test_names),
+		cmocka_unit_test(test_round_trip),   cmocka_unit_test(test_auto),
+		cmocka_unit_test(test_names),
 		cmocka_unit_test(test_attributes),   cmocka_unit_test(test_same_bytes),
 		cmocka_unit_test(test_bad_names),    cmocka_unit_test(test_foreign),
 		cmocka_unit_test(test_refusals),     cmocka_unit_test(test_truncated),

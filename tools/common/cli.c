@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "../../formats/atomic_file.h"
+#include "../../lib/mem.h"
 
 /* Letters of the common options that have no short form: beyond any table's. */
 enum { LETTER_HELP = 100000, LETTER_VERSION };
@@ -423,6 +424,7 @@ void cli_signals(void)
 	for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
 		if (sigaction(numbers[i], NULL, &old) == 0 && old.sa_handler != SIG_IGN)
 			sigaction(numbers[i], &tidy, NULL);
+	mem_keep();
 	/* A file-size limit then shows as a write error, with its message. */
 	signal(SIGXFSZ, SIG_IGN);
 }
