@@ -107,7 +107,7 @@ def section(run):
         defaults; a further view is one more camera in the same run. *MB* is the peak of memory.
         *Picture* is the relative rmse of the first view at the centres of its pixels, *bias*
         of its mean, *99 %* the 99th percentile of the relative error of pixels (lengths over
-        R, G, B; without the yardstick's noise to first order, – where that is more than half),
+        R, G, B; without the yardstick's noise, – where that is more than half),
         all without the pixels that see a lamp or nothing. *Irradiance* is the relative rmse of
         elements, weighted by area. *Of reference* is what `reference` reaches in the same
         processor seconds, between runs of {listed(run.plan.ladder)} paths a pixel and

@@ -144,7 +144,7 @@ def section(run):
         is everything: `mesh`, `ffcalc`, `shoot` and a view; *view 2 …* is what each further one
         costs, a run of `trace` by itself. *Error* is the rmse over the mean of all pixels that
         see neither the lamp nor nothing, *bias* that of the mean, *95 %* and *99 %* percentiles of
-        the relative error of pixels, without the yardstick's noise to first order. *Refined* is
+        the relative error of pixels, without the yardstick's noise. *Refined* is
         `mesh --refine` by solutions with `ffcalc -n 1024`, whose seconds count; *stated* is
         the error that `trace` itself prints. The last columns are the error of `reference`
         after the same processor seconds. The plot leaves out what something faster is better

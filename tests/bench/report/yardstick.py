@@ -54,16 +54,17 @@ class Errors:
     """Of a picture, all relative: rmse, bias of the mean, percentiles of pixels by QUANTILES
     (lengths over R, G, B, as exrcmp has them), and what these are of the yardstick itself.
 
-    Noise widens a percentile, to first order by its variance. Half the paths have twice
+    Noise widens a percentile: its square by about the variance. Half the paths have twice
     that, so that it can be taken off: what is found with half is as much beyond what is found
-    with all as this is beyond the truth."""
+    with all as this is beyond the truth, in squares."""
 
     def __init__(self, a, b, c):
         self.rmse, self.bias = off(a, b, c), float(np.mean(a) / np.mean((b + c) / 2) - 1)
         mean = (b + c) / 2
         tail = lambda x, q: float(np.percentile(length(x) / length(mean), q))
-        self.tail = {q: max(0, 2 * tail(a - mean, q) - (tail(a - b, q) + tail(a - c, q)) / 2)
-                     for q in QUANTILES}
+        square = lambda x, q: tail(x, q) ** 2
+        self.tail = {q: math.sqrt(max(0, 2 * square(a - mean, q) -
+                                      (square(a - b, q) + square(a - c, q)) / 2)) for q in QUANTILES}
         self.noise = {q: tail((b - c) / 2, q) for q in QUANTILES}
 
 
