@@ -14,7 +14,7 @@
 #define REVISION_MESH "6"
 #define REVISION_FF "12"
 #define REVISION_RAD "12"
-#define REVISION_VIEW "7"
+#define REVISION_VIEW "8"
 
 /* Strings are owned (malloc) and may be NULL. */
 struct cache_info {
