@@ -49,7 +49,15 @@ LOBES = ["--lobe-rays", "262144"]
 CLASSES = {
     #                     patch element hemicube                  rays              shoot
     "infinite_plates_*": (1/2,  1/4,  ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-9"]),
+    "sphere_mirror_*":   (1,    1,    ["-n", "32", "-p", "32", "--depth", "8"],
+                          ["-n", "65536", "--gather", "0", "--depth", "8"], ["-e", "1e-9"]),
     "*sphere*":          (1,    1,    ["-n", "32", "-p", "32"],  ["-n", "2048"], ["-e", "1e-9"]),
+    "lobe_in_box_*":     (1,    1,    ["-n", "64", "-p", "16", "--lobe-rays", "65536"],
+                          ["-n", "4096", "--lobe-rays", "65536"], ["-e", "1e-9"]),
+    "*_to_mirror_*":     (1/4,  1/4,  ["-n", "128", "-p", "64", "--lobe-rays", "65536"],
+                          ["-n", "32768", "--lobe-rays", "32768"], ["-e", "1e-9"]),
+    "swap_*":            (1/4,  1/4,  ["-n", "128", "-p", "64", "--lobe-rays", "65536"],
+                          ["-n", "32768", "--lobe-rays", "32768"], ["-e", "1e-9"]),
     "facing_mirrors_*":  (1/2,  1/2,  ["-n", "16", "-p", "16", "--depth", "1024"],
                           ["-n", "1024", "--depth", "1024"], ["-e", "1e-9"]),
     "furnace":           (1/4,  1/4,  ["-n", "32", "-p", "256"], ["-n", "4096"], ["-e", "1e-12"]),
@@ -451,11 +459,18 @@ def evaluate_all(ids, methods, jobs):
         for (name, method), (found, seconds) in zip(pairs, pool.map(timed, *zip(*pairs))):
             results += found
             if sys.stderr.isatty() or os.environ.get("VERBOSE"):
-                worst = max((r.worst(0)[2] for r in found if isinstance(r, Value)), default=0)
-                noise = max((r.noise() or 0 for r in found if isinstance(r, Value)), default=0)
-                print(f"oracles: {name} {method} {seconds:.1f} s, at most {worst:.2f} of a tolerance, "
-                      f"2 standard errors {noise:.2f}", file=sys.stderr, flush=True)
+                print(f"oracles: {name} {method} {seconds:.1f} s, {summary(found)}", file=sys.stderr,
+                      flush=True)
     return results
+
+
+def summary(results):
+    values = [r for r in results if isinstance(r, Value)]
+    said = [r.text for r in results if r not in values and r.failed]
+    if values:
+        said.append(f"at most {max(r.worst(0)[2] for r in values):.2f} of a tolerance, "
+                    f"2 standard errors {max(r.noise() or 0 for r in values):.2f}")
+    return "; ".join(said)
 
 
 def family_z(results):
