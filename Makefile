@@ -64,7 +64,7 @@ $(BUILD)/%.o: %.c
 
 # Loops written to become vector code.
 FAST := ff_sample joint clear cubature exchange shadow blocker seen sight eye_polygon facet ff_matrix ff_batch \
-	reconstruct reconstruct_fit
+	reconstruct reconstruct_fit send tail solver irradiance overshoot
 $(FAST:%=$(BUILD)/lib/%.o): CFLAGS += -O3 -fno-math-errno -fno-trapping-math
 
 # tinygltf and nlohmann's header are not ours to hold to our warnings.

@@ -257,8 +257,6 @@ void cache_names_free(char **name, size_t n)
 static int copy_names(const struct container *c, const char *key, const json_t *list,
                       char **name, size_t n, struct err *e)
 {
-	if (!json_is_array(list) || json_array_size(list) != n)
-		return container_refuse(c, e, "metadata %s: not a list of %zu names", key, n);
 	for (size_t i = 0; i < n; i++) {
 		const char *text = json_string_value(json_array_get(list, i));
 		if (!text)
@@ -277,8 +275,14 @@ int cache_read_names(const struct container *c, const char *key, char ***name, s
 	json_error_t je;
 	json_t *list = text ? json_loads(text, 0, &je) : NULL;
 
-	*name = mem_new(n, sizeof **name, key, e);
-	int failed = !*name || copy_names(c, key, list, *name, n, e);
+	*name = NULL;
+	/* Before there is room for them: n comes from the file, too. */
+	int failed = !json_is_array(list) || json_array_size(list) != n;
+	if (failed)
+		container_refuse(c, e, "metadata %s: not a list of %zu names", key, n);
+	else
+		failed = !(*name = mem_new(n, sizeof **name, key, e)) ||
+		         copy_names(c, key, list, *name, n, e);
 	json_decref(list);
 	if (!failed)
 		return 0;

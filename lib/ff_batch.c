@@ -31,6 +31,29 @@ double batch_put_value(struct ff_batch *b, uint32_t column, double w)
 	return (double)(((float *)b->value.data)[b->value.n++] = (float)w);
 }
 
+double batch_put_values(struct ff_batch *b, const uint32_t *column, const void *x, size_t n, double scale)
+{
+	uint32_t *to = (uint32_t *)b->column.data + b->column.n;
+	float *narrow = b->f64 ? NULL : (float *)b->value.data + b->value.n;
+	double *wide = b->f64 ? (double *)b->value.data + b->value.n : NULL, sum = 0;
+	size_t k = 0;
+
+	/* Stores first and looks then: no branch to be guessed. */
+	for (size_t j = 0; j < n; j++) {
+		double w = scale * (wide ? ((const double *)x)[j] : (double)((const float *)x)[j]);
+		to[k] = column[j];
+		if (wide)
+			wide[k] = w;
+		else
+			narrow[k] = (float)w;
+		sum += wide ? w : (double)narrow[k];
+		k += w > 0;
+	}
+	b->column.n += k;
+	b->value.n += k;
+	return sum;
+}
+
 int batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *r,
                     struct err *e)
 {

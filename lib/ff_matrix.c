@@ -26,6 +26,7 @@ struct matrix {
 	int curved;                   /* some side is: it has no facets, its pairs are by rays */
 	struct facet_set facets;
 	struct body_set bodies;
+	struct joint_table table;     /* empty unless side i is facet i, and nothing ever between */
 	double centre[3];
 	struct thread *thread;
 	/* The band in work: rows [first, first + rows), all columns. */
@@ -73,6 +74,29 @@ static double pair(struct matrix *m, struct thread *t, size_t a, size_t b)
 	return sum;
 }
 
+/* Values [begin, end) of a row, all left or all right of the diagonal: where one cheap rule
+ * does, four at a time. */
+static void do_span(struct matrix *m, struct thread *t, size_t r, size_t begin, size_t end)
+{
+	size_t i = m->first + r;
+	double one[JOINT_ONE], x[4];
+
+	if (m->table.n)
+		joint_one(&m->table, i, one);
+	for (size_t j = begin; j < end; j += 4) {
+		int known = m->table.n ? joint_four(&m->table, one, j, j < i, x) : 0;
+		for (size_t k = 0; k < 4 && j + k < end; k++) {
+			if (!(known >> k & 1)) {
+				set(m, r, j + k, pair(m, t, i, j + k));
+				continue;
+			}
+			set(m, r, j + k, x[k]);
+			t->x.counts.pairs += x[k] > 0;
+			t->x.counts.clear += x[k] > 0;
+		}
+	}
+}
+
 /* A row of the band: what is right of the diagonal, and all outside the band. */
 static void do_rows(void *arg, size_t begin, size_t end, int thread)
 {
@@ -80,10 +104,8 @@ static void do_rows(void *arg, size_t begin, size_t end, int thread)
 	struct thread *t = &m->thread[thread];
 
 	for (size_t r = begin; r < end; r++) {
-		for (size_t j = 0; j < m->first; j++)
-			set(m, r, j, pair(m, t, m->first + r, j));
-		for (size_t j = m->first + r + 1; j < m->n; j++)
-			set(m, r, j, pair(m, t, m->first + r, j));
+		do_span(m, t, r, 0, m->first);
+		do_span(m, t, r, m->first + r + 1, m->n);
 	}
 }
 
@@ -239,13 +261,11 @@ static int put_row(struct ff_batch *b, const struct matrix *m, size_t r, struct 
 	struct batch_row *row = &m->row[r];
 	double area = m->area[m->first + r], sum = m->rest[r].escape + m->rest[r].black;
 
+	const void *x = m->e32 ? (const void *)(m->e32 + r * m->n) : m->e64 + r * m->n;
+
 	if (batch_begin(b, e) || batch_reserve(b, m->n, e))
 		return -1;
-	for (size_t j = 0; j < m->n; j++) {
-		double x = get(m, r, j);
-		if (x > 0)
-			sum += batch_put_value(b, m->side[j], x / area);
-	}
+	sum += batch_put_values(b, m->side, x, m->n, 1 / area);
 	row->scale = sum > 0 ? 1 / sum : 0;
 	return batch_put_block(b, 0, &m->rest[r], e) || batch_put_row(b, row, e) ? -1 : 0;
 }
@@ -324,6 +344,18 @@ static int find_sides(struct matrix *m, struct err *e)
 	return 0;
 }
 
+/* A table of the facets, where it can be used. */
+static int tabulate(struct matrix *m, double relative, struct err *e)
+{
+	const uint32_t *start = m->facets.start;
+	int simple = !m->bodies.nodes && m->facets.facets == m->n;
+
+	for (size_t i = 0; simple && i < m->n; i++)
+		simple = start[m->side[i]] == i && start[m->side[i] + 1] == i + 1;
+	return simple ? joint_table_new(m->facets.facet, m->facets.joint, m->n, relative, m->bodies.near,
+	                                &m->table, e) : 0;
+}
+
 /* Nothing sends light on but by Lambert's law. */
 int ff_matrix_can(const struct ff_job *j)
 {
@@ -343,7 +375,7 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
 	                              .crowd_rays = CROWD_RAYS };
 	size_t a = 0, b;
 	int bad = find_sides(&m, e) || facet_set_init(&m.facets, j->m, FACETS_OF_PATCHES, e) ||
-	          body_set_init(&m.bodies, j->m, e);
+	          body_set_init(&m.bodies, j->m, e) || tabulate(&m, o.relative, e);
 
 	facet_centre(j->m, m.centre);
 	for (size_t i = 0; !bad && i < m.n; i++)
@@ -373,6 +405,7 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
 	free(m.rest);
 	free(m.closed);
 	free(m.doubt.data);
+	joint_table_free(&m.table);
 	facet_set_free(&m.facets);
 	body_set_free(&m.bodies);
 	return bad ? -1 : 0;

@@ -136,6 +136,11 @@ struct batch_row {
 int batch_begin(struct ff_batch *b, struct err *e);
 int batch_reserve(struct ff_batch *b, size_t values, struct err *e);
 double batch_put_value(struct ff_batch *b, uint32_t column, double value);
+
+/* The same for those of n values x (double, or float unless b->f64) that are above 0, times
+ * `scale`; returns the sum of what is stored. */
+double batch_put_values(struct ff_batch *b, const uint32_t *column, const void *x, size_t n,
+                        double scale);
 int batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *rest,
                     struct err *e);
 int batch_put_row(struct ff_batch *b, const struct batch_row *r, struct err *e);

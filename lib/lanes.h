@@ -22,12 +22,14 @@ static inline size_t lanes_vectors(size_t channels)
 	return (channels + LANES - 1) / LANES;
 }
 
-/* n zeroed vectors, aligned as such; *room is what to free. NULL and e when out of
+/* n zeroed vectors, aligned to lines of the cache; *room is what to free. NULL and e when out of
  * memory. */
 static inline lanes *lanes_new(size_t n, void **room, const char *what, struct err *e)
 {
-	*room = mem_new(n + 1, sizeof(lanes), what, e); /* calloc aligns to 16 bytes only */
-	return *room ? (lanes *)(((uintptr_t)*room + 31) & ~(uintptr_t)31) : NULL;
+	enum { LINE = 64 };          /* calloc aligns to 16 bytes only */
+
+	*room = mem_new(n + LINE / sizeof(lanes), sizeof(lanes), what, e);
+	return *room ? (lanes *)(((uintptr_t)*room + LINE - 1) & ~(uintptr_t)(LINE - 1)) : NULL;
 }
 
 /* Rows of n doubles to rows of vectors, padded with what is there (0), and back. */
@@ -59,6 +61,12 @@ static inline double lanes_total(const lanes *x, size_t n)
 static inline lanes lanes_abs(lanes x)
 {
 	return (lanes)((lanes_mask)x & INT64_MAX);
+}
+
+/* x, or 0 where not `yes`, without a branch. */
+static inline lanes lanes_if(lanes x, int yes)
+{
+	return (lanes)((lanes_mask)x & -(long long)yes);
 }
 
 static inline lanes lanes_all(double x)

@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "mem.h"
+#include "send_exact.h"
 #include "solver.h"
 
 enum { BASIS_MAX = 40, BASIS_MIN = 4 };
@@ -239,36 +240,28 @@ static void limit(const struct krylov *k, uint32_t row, int freshness, const lan
 	}
 }
 
-static void take(lanes *from, const lanes *flux, lanes *out, size_t n)
-{
-	for (size_t v = 0; v < n; v++) {
-		from[v] -= flux[v];
-		out[v] += flux[v];
-	}
-}
-
 static void shoot_side(struct krylov *k, uint32_t ps, lanes *d)
 {
 	struct solver *v = k->v;
+	struct sender *s = &v->sender;
 	const struct transport *t = v->t;
 	size_t n = k->vectors;
-	lanes share[2 * VECTORS_MAX];
+	const lanes *share = sender_share(s, ps);
 
-	memset(v->out, 0, n * sizeof *v->out);
 	limit(k, t->diffuse_row[ps], MIXED, NULL, d + ps * n);
-	take(v->sender.unshot_diffuse + ps * n, d + ps * n, v->out, n);
+	exact_take(s, exact_diffuse(s, ps), d + ps * n);
 	solver_send_diffuse(v, ps, d + ps * n, v->s->shot);
-	if (t->target_link[ps] < t->target_link[ps + 1])
-		solver_lobe_shares(v, ps, share);
+	exact_return(s, exact_diffuse(s, ps), &v->sent);
 	for (uint64_t l = 2 * t->target_link[ps]; l < 2 * t->target_link[ps + 1]; l++) {
 		lanes *flux = d + (v->s->patch_sides + l) * n;
 		for (uint64_t way = 0; way < 2; way++)
 			limit(k, t->link_row[(l & ~(uint64_t)1) + way], (int)(l & 1),
 			      share + way * n, flux);
-		take(v->sender.unshot_link + l * n, flux, v->out, n);
+		exact_take(s, exact_link(s, l), flux);
 		solver_send_link(v, l, flux, v->s->shot);
+		exact_return(s, exact_link(s, l), &v->sent);
 	}
-	solver_book(v, v->out);
+	solver_book(v, NULL);
 	v->s->shots++;
 }
 
@@ -325,7 +318,7 @@ static void shoot_emission(struct solver *v)
 	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++)
 		for (size_t b = 0; b < bands; b++)
 			if (v->s->unshot_emission[ps * bands + b] > 0) {
-				solver_shoot(v, ps);
+				solver_shoot(v, ps, 0);
 				break;
 			}
 }
@@ -336,7 +329,8 @@ int solver_overshoot(struct solver *v, double worst, double stop, struct err *e)
 	 * a pass or two. */
 	const double target = .01 * stop / worst;
 	struct krylov k;
-	double left;
+	struct exact exact;
+	double left = worst;
 	int bad = krylov_init(&k, v, e);
 
 	if (!bad) {
@@ -347,8 +341,10 @@ int solver_overshoot(struct solver *v, double worst, double stop, struct err *e)
 		memcpy(k.basis + v->s->patch_sides * k.vectors, v->sender.unshot_link,
 		       2 * v->s->links * k.vectors * sizeof(lanes));
 		lanes *d = solution_of(&k, iterate(&k, target));
-		for (uint32_t ps = 0; ps < v->s->patch_sides; ps++)
+		bad = exact_begin(&v->sender, &exact, e);
+		for (uint32_t ps = 0; !bad && ps < v->s->patch_sides; ps++)
 			shoot_side(&k, ps, d);
+		exact_end(&v->sender);
 		solver_survey(v, &left);
 	}
 	krylov_free(&k);

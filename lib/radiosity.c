@@ -38,6 +38,9 @@ static int solution_arrays(struct solution *s, const struct model *m,
 	       s->unshot_diffuse && s->unshot_link && s->shot && s->ledger ? 0 : -1;
 }
 
+/* Flux that can be squared, for variances. */
+static const double brightest = 1e150;
+
 int solution_begin(struct solution *s, const struct model *m, const struct transport *t,
                    int light_groups, struct err *e)
 {
@@ -58,51 +61,13 @@ int solution_begin(struct solution *s, const struct model *m, const struct trans
 		return err_set(e, "no emitter: nothing in this scene gives light; give a material "
 		               "emission (glTF emissiveFactor, or emission_front in its extras) or "
 		               "add a light (KHR_lights_punctual)");
-	if (!isfinite(all))
-		return err_set(e, "the emitted flux is not a finite number");
+	if (!(all < brightest))
+		return err_set(e, "the emitted flux, %g, is too large to compute with; lower the "
+		               "emission of the materials and lights", all);
 	return 0;
 }
 
 /* ---- rounds ---- */
-
-/* Unshot flux by weight of a side now, or an estimate from above of it. */
-static double due(const struct solver *v, uint32_t ps, int exact)
-{
-	const struct sender *s = &v->sender;
-	const uint64_t *first = v->t->target_link + ps;
-	size_t vectors = s->vectors, bands = (size_t)v->s->bands;
-	const lanes *weight = v->weight + v->parts.of[ps] * vectors;
-	uint32_t group = solution_group(v->s, v->t->m, ps);
-	lanes sum = { 0 };
-	double emission = 0;
-
-	for (size_t k = 0; k < bands; k++)
-		emission += v->s->unshot_emission[ps * bands + k];
-	emission *= ((const double *)weight)[group * bands];
-	for (size_t i = 0; i < vectors; i++)
-		sum += s->unshot_diffuse[ps * vectors + i] * weight[i];
-	if (!exact)
-		return emission + lanes_total(&sum, 1) + v->links[ps] +
-		       s->link_gain[ps] * v->weight_max[v->parts.of[ps]];
-	for (uint64_t l = 2 * first[0]; l < 2 * first[1]; l++)
-		for (size_t i = 0; i < vectors; i++)
-			sum += s->unshot_link[l * vectors + i] * weight[i];
-	return emission + lanes_total(&sum, 1);
-}
-
-/* Whether a side's turn has come, by its unshot flux now. Flux has only grown since the
- * survey, and running sums tell all but the close cases: links are many. */
-static int is_due(const struct solver *v, uint32_t ps)
-{
-	const double least = v->s->round[ROUND_LEAST], close = 1e-9;
-
-	if (v->priority[ps] > 0 && v->priority[ps] >= least)
-		return 1;
-	if (due(v, ps, 0) < least * (1 - close))
-		return 0;
-	double p = due(v, ps, 1);
-	return p > 0 && p >= least;
-}
 
 /* Lights come before the first round, whatever they are worth: they shoot once. 0 when the
  * last shot stopped it. */
@@ -128,15 +93,15 @@ static int shoot_lights(struct solver *v, uint64_t last_shot)
 static int finish_round(struct solver *v, uint64_t last_shot)
 {
 	struct solution *s = v->s;
+	const double least = s->round[ROUND_LEAST];
 
 	for (uint32_t ps = (uint32_t)s->round[ROUND_NEXT]; ps < s->patch_sides; ps++) {
-		if (!is_due(v, ps))
-			continue;
-		if (s->shots >= last_shot) {
+		if (s->shots < last_shot) {
+			solver_shoot(v, ps, least);
+		} else if (solver_is_due(v, ps, least)) {
 			s->round[ROUND_NEXT] = ps;
 			return 0;
 		}
-		solver_shoot(v, ps);
 	}
 	s->round[ROUND_LEAST] = s->round[ROUND_NEXT] = 0;
 	return 1;
@@ -144,20 +109,26 @@ static int finish_round(struct solver *v, uint64_t last_shot)
 
 /* ---- when to overshoot ---- */
 
+/* Enters what has been read since the last time. */
+static void count_work(struct solver *v)
+{
+	v->s->round[ROUND_WORK] += (double)(v->sender.runs - v->counted);
+	v->counted = v->sender.runs;
+}
+
 /* Whether shots would go on for longer than overshooting takes, by how much the last
- * sweeps (as many shots as there are sides) have brought. */
+ * sweeps (as many runs as there are) have brought. */
 static int is_slow(struct solver *v, double unshot, double stop)
 {
 	enum { SWEEPS = 2, WORTH = 20 };
-	double *round = v->s->round, shots = (double)v->s->shots, sides = (double)v->sides;
+	double *round = v->s->round, sweeps = round[ROUND_WORK] / (double)v->t->runs;
 
 	if (v->negative)
 		return 1;
-	if (shots - round[ROUND_SHOTS] < SWEEPS * sides)
+	if (!(sweeps >= SWEEPS))
 		return 0;
-	double sweeps = (shots - round[ROUND_SHOTS]) / sides;
 	double rate = round[ROUND_UNSHOT] > 0 ? log(round[ROUND_UNSHOT] / unshot) / sweeps : INFINITY;
-	round[ROUND_SHOTS] = shots;
+	round[ROUND_WORK] = 0;
 	round[ROUND_UNSHOT] = unshot;
 	return stop > 0 && log(unshot / stop) > WORTH * rate;
 }
@@ -178,6 +149,10 @@ static void tell(const struct solver *v, const struct radiosity_hooks *hooks,
 	            unshot, emitted, v->residual });
 }
 
+/* A round goes down to a part of the largest priority. The more rounds, the better the order
+ * of shots, but each looks at all links. */
+enum { DEPTH = 32 };
+
 /* Rounds, or overshooting where they are slow, until `stop` or the last shot. */
 static int rounds(struct solver *v, const struct radiosity_options *o,
                   const struct radiosity_hooks *hooks, struct radiosity_report *r,
@@ -195,10 +170,11 @@ static int rounds(struct solver *v, const struct radiosity_options *o,
 			go_on = solver_overshoot(v, r->unshot, o->stop, e);
 		} else {
 			if (s->round[ROUND_LEAST] == 0)
-				s->round[ROUND_LEAST] = top / 2;
+				s->round[ROUND_LEAST] = top / DEPTH;
 			go_on = finish_round(v, last);
 		}
 		top = solver_survey(v, &r->unshot);
+		count_work(v);
 		r->rounds++;
 		tell(v, hooks, r);
 	}

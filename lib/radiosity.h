@@ -1,12 +1,12 @@
 /* The radiosity solution by progressive shooting with memory of direction.
  *
- * A shot sends all unshot flux of one patch-side: its own emission, what leaves it
- * diffusely, and, source by source, what leaves by the lobes about R and T of the
- * light that arrived on it (the paper's arrays of unshot radiosity, kept only for
- * sources that a directional patch really sees: the links of a .ff file). Shots go
- * in rounds: a round shoots every patch-side, in index order, that holds at least
- * half of the largest relative unshot flux at its beginning. Flux of all bands and light
- * groups goes in one shot.
+ * A shot sends unshot flux of one patch-side: its own emission with what leaves it
+ * diffusely, and, source by source, what leaves by the lobes about R and T of the light
+ * that arrived on it (the paper's arrays of unshot radiosity, kept only for sources that a
+ * directional patch really sees: the links of a .ff file). Shots go in rounds: a round goes
+ * through the patch-sides in index order and shoots, of each, what has a priority of at
+ * least a part of the largest at its beginning: unshot flux over what is emitted and over
+ * the work of sending it. Flux of all bands and light groups goes in one shot.
  *
  * Shots work on flux summed by patch; elements get their irradiance at the end, in
  * one pass over the form factors with the total that each row has sent. */
@@ -51,7 +51,8 @@ struct radiosity_report {
 };
 
 /* Zeroed state for a model and its transport with all emission unshot; light_groups: see
- * light_groups_set. 0, or -1 and e ("no emitter" if nothing emits). */
+ * light_groups_set. 0, or -1 and e ("no emitter" if nothing emits, or if that is too much
+ * to compute with). */
 int solution_begin(struct solution *s, const struct model *m, const struct transport *t,
                    int light_groups, struct err *e);
 

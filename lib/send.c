@@ -5,6 +5,7 @@
 
 #include "bsdf.h"
 #include "mem.h"
+#include "send_exact.h"
 
 /* How the sides of materials split the flux that arrives on them. */
 static void fill_parts(struct sender *s)
@@ -17,14 +18,17 @@ static void fill_parts(struct sender *s)
 		int side = (int)(i & 1);
 		size_t at = material_at(mt, material, side);
 		double *part = (double *)(s->part + i * PARTS * s->vectors);
+		double *share = (double *)(s->share + i * 2 * s->vectors);
 		int lobe_r = bsdf_has_lobe(mt, material, side, 0);
 		int lobe_t = bsdf_has_lobe(mt, material, side, 1);
 		for (size_t c = 0; c < s->channels; c++) {
 			size_t k = c % (size_t)s->bands;
 			part[PART_RHO * width + c] = mt->rho_d[at + k];
 			part[PART_TAU * width + c] = mt->tau_d[at + k];
-			part[PART_LOBES * width + c] = (lobe_r ? mt->rho_s[at + k] : 0) +
-			                               (lobe_t ? mt->tau_s[at + k] : 0);
+			double r = lobe_r ? mt->rho_s[at + k] : 0, t = lobe_t ? mt->tau_s[at + k] : 0;
+			part[PART_LOBES * width + c] = r + t;
+			share[c] = r > 0 ? r / (r + t) : 0;
+			share[width + c] = r + t > 0 ? 1 - share[c] : 0;
 			part[PART_ABSORBED * width + c] =
 				1 - bsdf_albedo(mt, material, side, (int)k);
 		}
@@ -67,8 +71,9 @@ int sender_init(struct sender *s, const struct transport *t, size_t groups, stru
 	s->touched = mem_new(t->chains.n, sizeof *s->touched, "chain flux", e);
 	s->is_touched = mem_new(t->chains.n, 1, "chain flux", e);
 	s->part = lanes_new(2 * t->m->material.n * PARTS * s->vectors, &s->room[0], "albedos", e);
+	s->share = lanes_new(2 * t->m->material.n * 2 * s->vectors, &s->room[3], "albedos", e);
 	s->surface = mem_new(2 * t->m->patches, sizeof *s->surface, "albedos", e);
-	if (!s->chain_flux || !s->touched || !s->is_touched || !s->part || !s->surface)
+	if (!s->chain_flux || !s->touched || !s->is_touched || !s->part || !s->share || !s->surface)
 		return -1;
 	fill_parts(s);
 	return 0;
@@ -78,7 +83,6 @@ void sender_free(struct sender *s)
 {
 	for (size_t i = 0; i < sizeof s->room / sizeof *s->room; i++)
 		free(s->room[i]);
-	free(s->link_gain);
 	free(s->surface);
 	free(s->chain_flux);
 	free(s->touched);
@@ -92,8 +96,7 @@ int sender_load(struct sender *s, const struct solution *sol, struct err *e)
 
 	s->unshot_diffuse = lanes_new(sides * s->vectors, &s->room[1], "unshot flux", e);
 	s->unshot_link = lanes_new(links * s->vectors, &s->room[2], "unshot flux", e);
-	s->link_gain = mem_new(sides, sizeof *s->link_gain, "unshot flux", e);
-	if (!s->unshot_diffuse || !s->unshot_link || !s->link_gain)
+	if (!s->unshot_diffuse || !s->unshot_link)
 		return -1;
 	lanes_pack(s->unshot_diffuse, sol->unshot_diffuse, sides, s->channels);
 	lanes_pack(s->unshot_link, sol->unshot_link, links, s->channels);
@@ -106,8 +109,21 @@ void sender_store(const struct sender *s, struct solution *sol)
 	lanes_unpack(sol->unshot_link, s->unshot_link, 2 * s->t->links, s->channels);
 }
 
-static void into_chain(struct sender *s, uint32_t chain, const double *x, const double *part)
+/* The coefficients of an event, [bands]. */
+static const double *coefficient(const struct sender *s, uint32_t event)
 {
+	const struct materials *mt = &s->m->material;
+	size_t at = material_at(mt, event / 4, (int)(event / 2 % 2));
+
+	return (event & 1 ? mt->tau_s : mt->rho_s) + at;
+}
+
+/* Flux x by unit of the values that an event sends on. What no sample of the row followed
+ * stays in chain_flux of chain 0, which cannot be a child, and ends up as cut. */
+static void into_chain(struct sender *s, const struct onward *o, const double *x)
+{
+	const uint32_t chain = o->chain == CHAIN_NONE ? 0 : o->chain;
+	const double *part = coefficient(s, o->event);
 	double *flux = s->chain_flux + chain * s->channels;
 
 	if (!s->is_touched[chain]) {
@@ -115,30 +131,7 @@ static void into_chain(struct sender *s, uint32_t chain, const double *x, const 
 		s->touched[s->touches++] = chain;
 	}
 	for (size_t c = 0; c < s->channels; c++)
-		flux[c] += x[c] * part[c % (size_t)s->bands];
-}
-
-/* Flux x of a chain on a patch-side: what goes on by R and by T, by lobes too if these are
- * followed. Chains that no sample of the row followed stay in chain_flux and end up as
- * cut. */
-static void go_on(struct sender *s, uint32_t chain, uint32_t surface, int lobes,
-                  const double *x)
-{
-	const struct materials *mt = &s->m->material;
-	const struct chains *c = &s->t->chains;
-	size_t at = material_at(mt, surface >> 1, (int)(surface & 1));
-
-	for (int transmitted = 0; transmitted < 2; transmitted++) {
-		uint32_t slot = c->slot[2 * surface + (uint32_t)transmitted];
-		if (slot == CHAIN_NONE || (c->finite[slot] && !lobes))
-			continue;
-		uint32_t child = ((const uint32_t *)c->child.data)[(size_t)chain * c->events + slot];
-		if (child == chain) /* summed by go_round */
-			continue;
-		/* Chain 0 cannot be a child: it marks flux that no row follows. */
-		into_chain(s, child == CHAIN_NONE ? 0 : child, x,
-		           (transmitted ? mt->tau_s : mt->rho_s) + at);
-	}
+		flux[c] += x[c] * (part[c % (size_t)s->bands] * o->sum);
 }
 
 /* Takes the flux that waits for a chain. */
@@ -150,91 +143,161 @@ static void take(struct sender *s, uint32_t chain, double *x)
 	memset(flux, 0, s->channels * sizeof *flux);
 }
 
+/* Enters what became of flux in vector v. */
+static inline void book(const struct sender *s, lanes *to, size_t v, lanes flux)
+{
+	to[v] += flux;
+	if (s->exact)
+		exact_book(s->exact, v, flux);
+}
+
 static void finish(struct sender *s, lanes *cut)
 {
-	double x[CHANNELS_MAX];
+	lanes x[VECTORS_MAX];
 
 	for (size_t i = 0; i < s->touches; i++) {
-		take(s, s->touched[i], x);
-		for (size_t c = 0; cut && c < s->channels; c++)
-			((double *)cut)[c] += x[c];
+		x[s->vectors - 1] = (lanes){ 0 };
+		take(s, s->touched[i], (double *)x);
+		for (size_t v = 0; cut && v < s->vectors; v++)
+			book(s, cut, v, x[v]);
 		s->is_touched[s->touched[i]] = 0;
 	}
 	s->touches = 0;
 }
 
-/* Flux landing from a block: four channels of it, x by unit of the values. The loops over
- * runs are made twice, inlined with n known to be 1 and not. */
+/* ---- landing ---- */
+
+enum { LANDING_MAX = 4, FETCHED = 16, LINE = 64 };
+
+/* Flux landing from a block: N vectors of channels from v on of n, x by unit of the
+ * values. The loops over runs are inlined with a constant N. */
 struct landing {
 	const struct sender *s;
 	const struct block *block;
-	size_t v, n;                 /* vector of how many */
+	size_t v, n;
 	int freshness;
-	lanes x;
+	lanes x[LANDING_MAX];
 };
 
-/* Sums of two kinds by turns, as one addition would wait for the last. */
+/* What became of it. */
 struct landed {
-	lanes kept[2], absorbed[2], cut, guessed;
+	lanes arrived, kept, absorbed, cut, guessed;
 };
 
-static ALWAYS_INLINE void land_plain(const struct landing l, uint64_t run, lanes *kept,
-                                     lanes *absorbed)
+static ALWAYS_INLINE void land_plain(const struct landing *l, uint64_t run, size_t N, size_t n,
+                                     struct landed *sum)
 {
-	uint32_t target = l.s->t->run_target[run];
-	const lanes *part = l.s->part + l.s->surface[target] * PARTS * l.n + l.v;
-	lanes x = l.x * l.s->t->run_sum[run], same = part[PART_RHO * l.n] * x;
+	const uint32_t target = l->s->t->run_target[run];
+	const double value = l->s->t->run_sum[run];
+	const lanes *rho = l->s->part + l->s->surface[target] * PARTS * n + l->v;
+	lanes *unshot = l->s->unshot_diffuse + target * n + l->v;
 
-	l.s->unshot_diffuse[target * l.n + l.v] += same;
-	*kept += same;
-	*absorbed += part[PART_ABSORBED * l.n] * x;
+	for (size_t i = 0; i < N; i++) {
+		lanes x = l->x[i] * value, same = rho[i] * x;
+		unshot[i] += same;
+		sum[i].kept += same;
+		sum[i].arrived += x;
+	}
 }
 
-static ALWAYS_INLINE void land_special(const struct landing l, uint64_t run,
+static ALWAYS_INLINE void land_special(const struct landing *l, uint64_t run, size_t N, size_t n,
                                        struct landed *sum)
 {
-	uint32_t target = l.s->t->run_target[run];
-	uint32_t link = l.s->t->run_link[l.block->link + (run - l.block->special)];
-	const lanes *part = l.s->part + l.s->surface[target] * PARTS * l.n + l.v;
-	lanes x = l.x * l.s->t->run_sum[run], same = part[PART_RHO * l.n] * x;
-	lanes other = part[PART_TAU * l.n] * x, lobes = part[PART_LOBES * l.n] * x;
+	const struct sender *s = l->s;
+	const uint32_t target = s->t->run_target[run];
+	const uint32_t link = s->t->run_link[l->block->link + (run - l->block->special)];
+	const double value = s->t->run_sum[run];
+	const lanes *part = s->part + s->surface[target] * PARTS * n + l->v;
+	lanes *here = s->unshot_diffuse + target * n + l->v;
+	lanes *there = s->unshot_diffuse + (target ^ 1) * n + l->v, *to = NULL;
 
-	l.s->unshot_diffuse[target * l.n + l.v] += same;
-	l.s->unshot_diffuse[(target ^ 1) * l.n + l.v] += other;
-	sum->kept[0] += same + other;
-	sum->absorbed[0] += part[PART_ABSORBED * l.n] * x;
-	if (link == RUN_FOLLOWED)
-		return;
-	if (link == FF_NO_ROW) {
-		sum->cut += lobes;
-		return;
+	if (link < RUN_FOLLOWED)
+		to = s->unshot_link + (2 * (size_t)(link & ~RUN_GUESSED) + (size_t)l->freshness) * n +
+		     l->v;
+	for (size_t i = 0; i < N; i++) {
+		lanes x = l->x[i] * value, same = part[PART_RHO * n + i] * x;
+		lanes other = part[PART_TAU * n + i] * x, lobes = part[PART_LOBES * n + i] * x;
+		here[i] += same;
+		there[i] += other;
+		sum[i].kept += same + other;
+		sum[i].absorbed += part[PART_ABSORBED * n + i] * x;
+		if (to) {
+			to[i] += lobes;
+			sum[i].kept += lobes;
+			sum[i].guessed += lanes_if(lobes, (link & RUN_GUESSED) != 0);
+		} else if (link == FF_NO_ROW) {
+			sum[i].cut += lobes;
+		}
 	}
-	size_t at = 2 * (size_t)(link & ~RUN_GUESSED) + (size_t)l.freshness;
-	l.s->unshot_link[at * l.n + l.v] += lobes;
-	l.s->link_gain[target] += lanes_total(&lobes, 1);
-	sum->kept[1] += lobes;
-	if (link & RUN_GUESSED)
-		sum->guessed += lobes;
 }
 
-static ALWAYS_INLINE void land(const struct landing l, uint64_t i, uint64_t end,
-                               struct sent *sent)
+/* Links are all over memory: fetches what will be added to by up to FETCHED runs. */
+static void fetch_links(const struct sender *s, const struct block *block, uint64_t run,
+                        uint64_t end, int freshness)
 {
-	uint64_t special = l.block->special < end ? l.block->special : end;
-	struct landed sum = { 0 };
+	const uint32_t *link = s->t->run_link + block->link + (run - block->special);
+	const uint64_t n = end - run < FETCHED ? end - run : FETCHED;
 
-	for (; i + 1 < special; i += 2) {
-		land_plain(l, i, &sum.kept[0], &sum.absorbed[0]);
-		land_plain(l, i + 1, &sum.kept[1], &sum.absorbed[1]);
+	for (uint64_t i = 0; i < n; i++) {
+		const lanes *to = s->unshot_link + s->vectors *
+		                  (2 * (size_t)(link[i] & ~RUN_GUESSED) + (size_t)freshness);
+		for (size_t v = 0; link[i] < RUN_FOLLOWED && v < s->vectors; v += LINE / sizeof *to)
+			__builtin_prefetch(to + v, 1);
 	}
-	if (i < special)
-		land_plain(l, i++, &sum.kept[0], &sum.absorbed[0]);
-	for (; i < end; i++)
-		land_special(l, i, &sum);
-	sent->kept[l.v] += sum.kept[0] + sum.kept[1];
-	sent->absorbed[l.v] += sum.absorbed[0] + sum.absorbed[1];
-	sent->cut[l.v] += sum.cut;
-	sent->guessed[l.v] += sum.guessed;
+}
+
+static ALWAYS_INLINE void land_all(const struct landing *l, uint64_t i, uint64_t end, size_t N,
+                                   size_t n, struct sent *sent)
+{
+	const uint64_t special = l->block->special < end ? l->block->special : end;
+	struct landed sum[2 * LANDING_MAX] = { 0 };
+
+	/* By turns, as one addition would wait for the last. */
+	for (; N == 1 && i + 1 < special; i += 2) {
+		land_plain(l, i, N, n, sum);
+		land_plain(l, i + 1, N, n, sum + 1);
+	}
+	for (; i < special; i++)
+		land_plain(l, i, N, n, sum);
+	if (N == 1) {
+		sum[0].arrived += sum[1].arrived;
+		sum[0].kept += sum[1].kept;
+	}
+	for (size_t k = 0; k < N; k++)
+		sum[k].absorbed = sum[k].arrived - sum[k].kept;
+	for (; i < end; i++) {
+		if ((i - l->block->special) % FETCHED == 0 && l->v == 0 && i + FETCHED < l->block[1].run)
+			fetch_links(l->s, l->block, i + FETCHED, l->block[1].run, l->freshness);
+		land_special(l, i, N, n, sum);
+	}
+	for (size_t k = 0; k < N; k++) {
+		sent->kept[l->v + k] += sum[k].kept;
+		sent->absorbed[l->v + k] += sum[k].absorbed;
+		sent->cut[l->v + k] += sum[k].cut;
+		sent->guessed[l->v + k] += sum[k].guessed;
+	}
+}
+
+/* N of the n vectors; where these are all, the compiler knows n too. */
+static void land(const struct landing *l, size_t N, uint64_t begin, uint64_t end,
+                 struct sent *sent)
+{
+	const int all = N == l->n;
+
+	switch (N) {
+	case 1:
+		all ? land_all(l, begin, end, 1, 1, sent) : land_all(l, begin, end, 1, l->n, sent);
+		break;
+	case 2:
+		all ? land_all(l, begin, end, 2, 2, sent) : land_all(l, begin, end, 2, l->n, sent);
+		break;
+	case 3:
+		land_all(l, begin, end, 3, l->n, sent);
+		break;
+	case LANDING_MAX:
+		land_all(l, begin, end, LANDING_MAX, l->n, sent);
+		break;
+	}
 }
 
 static void send_block(struct sender *s, const struct block *block, int freshness,
@@ -243,56 +306,43 @@ static void send_block(struct sender *s, const struct block *block, int freshnes
 	enum { TILE = 64 };          /* runs that stay in cache for all vectors */
 	const struct transport *t = s->t;
 	const uint64_t end = block[1].run;
-	const size_t n = s->vectors;
+	const uint64_t tile = s->vectors > LANDING_MAX ? TILE : end - block->run;
+	struct landing l = { s, block, 0, s->vectors, freshness, { { 0 } } };
 
-	if (n == 1)
-		land((struct landing){ s, block, 0, 1, freshness, in[0] }, block->run, end, sent);
-	else
-		for (uint64_t i = block->run; i < end; i += TILE)
-			for (size_t v = 0; v < n; v++)
-				land((struct landing){ s, block, v, n, freshness, in[v] }, i,
-				     i + TILE < end ? i + TILE : end, sent);
 	s->runs += end - block->run;
 	s->bytes += (double)(end - block->run) * (sizeof *t->run_target + sizeof *t->run_sum) +
 	            (double)(end - block->special) * sizeof *t->run_link;
+	if (s->exact) {
+		exact_land(s, block, freshness, in, sent);
+		return;
+	}
+	fetch_links(s, block, block->special, end, freshness);
+	for (uint64_t i = block->run; i < end; i += tile)
+		for (l.v = 0; l.v < l.n; l.v += LANDING_MAX) {
+			size_t N = l.n - l.v < LANDING_MAX ? l.n - l.v : LANDING_MAX;
+			memcpy(l.x, in + l.v, N * sizeof *in);
+			land(&l, N, i, i + tile < end ? i + tile : end, sent);
+		}
 }
 
-/* What goes on from the runs of a block that are followed, x its flux by unit of the
- * values. */
+/* What goes on from a block, x its flux by unit of the values; go_round has what comes
+ * back to it. */
 static void send_on(struct sender *s, const struct block *block, const double *x)
 {
-	const struct transport *t = s->t;
-	double landed[CHANNELS_MAX];
-
-	for (uint64_t i = block->ideal; i < block[1].run; i++) {
-		uint32_t surface = s->surface[t->run_target[i]];
-		uint32_t link = t->run_link[block->link + (i - block->special)];
-		for (size_t c = 0; c < s->channels; c++)
-			landed[c] = x[c] * t->run_sum[i];
-		go_on(s, block->chain, surface, link == RUN_FOLLOWED, landed);
-	}
+	for (uint64_t i = block->onward; i < block[1].onward; i++)
+		if (s->t->onward[i].chain != block->chain)
+			into_chain(s, &s->t->onward[i], x);
 }
 
 /* How much of the flux in a block comes back to it, per band, through events whose
  * count has stopped: the ratio of a geometric series. */
 static void loop_gain(const struct sender *s, const struct block *block, double *gain)
 {
-	const struct chains *c = &s->t->chains;
-	const struct materials *mt = &s->m->material;
-	const uint32_t *child = (const uint32_t *)c->child.data + (size_t)block->chain * c->events;
-
 	memset(gain, 0, (size_t)s->bands * sizeof *gain);
-	for (uint32_t event = 0; event < c->events; event++) {
-		uint32_t id = c->event[event];
-		size_t at = material_at(mt, id / 4, (int)(id / 2 % 2));
-		double landed = 0;
-		if (child[event] != block->chain)
-			continue;
-		for (uint64_t i = block->ideal; i < block[1].run; i++)
-			if (s->surface[s->t->run_target[i]] == id / 2)
-				landed += s->t->run_sum[i];
-		for (int k = 0; k < s->bands; k++)
-			gain[k] += (id & 1 ? mt->tau_s : mt->rho_s)[at + (size_t)k] * landed / block->sum;
+	for (uint64_t i = block->onward; i < block[1].onward; i++) {
+		const struct onward *o = &s->t->onward[i];
+		for (int k = 0; o->chain == block->chain && k < s->bands; k++)
+			gain[k] += coefficient(s, o->event)[k] * o->sum / block->sum;
 	}
 }
 
@@ -301,20 +351,42 @@ static void loop_gain(const struct sender *s, const struct block *block, double 
 static void go_round(struct sender *s, const struct block *block, double *in, lanes *cut)
 {
 	double gain[BANDS_MAX];
+	lanes ever[VECTORS_MAX];
 
-	if (block->chain == 0 || !(block->sum > 0))
+	if (block->chain == 0 || !(block->sum > 0) || block->onward == block[1].onward)
 		return;
 	loop_gain(s, block, gain);
+	memset(ever, 0, s->vectors * sizeof *ever);
 	for (size_t c = 0; c < s->channels; c++) {
 		double g = gain[c % (size_t)s->bands];
-		if (g < 1 - 1e-9) {
-			in[c] /= 1 - g;
-		} else {
-			if (cut)
-				((double *)cut)[c] += in[c];
-			in[c] = 0;
-		}
+		((double *)ever)[c] = g < 1 - 1e-9 ? 0 : in[c];
+		in[c] = g < 1 - 1e-9 ? in[c] / (1 - g) : 0;
 	}
+	for (size_t v = 0; cut && v < s->vectors; v++)
+		book(s, cut, v, ever[v]);
+}
+
+void send_fetch(const struct sender *s, uint32_t row, int freshness, int ahead)
+{
+	enum { MOST = 64 };
+	const struct transport *t = s->t;
+	const struct block *block = &t->block[t->row_block[row]];
+
+	if (ahead > 2) {
+		__builtin_prefetch(block);
+		__builtin_prefetch(block + 1);
+		return;
+	}
+	const uint64_t first = block->run, n = block[1].run - first;
+	if (ahead == 1) {
+		fetch_links(s, block, block->special, first + n, freshness);
+		return;
+	}
+	for (uint64_t i = first; i < first + (n < MOST ? n : MOST); i += LINE / sizeof *t->run_sum) {
+		__builtin_prefetch(t->run_target + i);
+		__builtin_prefetch(t->run_sum + i);
+	}
+	__builtin_prefetch(t->run_link + block->link);
 }
 
 void send_row(struct sender *s, uint32_t row, int freshness, const lanes *flux,
@@ -337,10 +409,10 @@ void send_row(struct sender *s, uint32_t row, int freshness, const lanes *flux,
 		go_round(s, block, (double *)in, sent->cut);
 		for (size_t v = 0; v < n; v++) {
 			in[v] /= block->sum > 0 ? block->sum : 1;
-			sent->escaped[v] += in[v] * block->escape;
-			sent->absorbed[v] += in[v] * block->black;
-			sent->lost[v] += in[v] * block->lost;
-			sent->cut[v] += in[v] * block->cut;
+			book(s, sent->escaped, v, in[v] * block->escape);
+			book(s, sent->absorbed, v, in[v] * block->black);
+			book(s, sent->lost, v, in[v] * block->lost);
+			book(s, sent->cut, v, in[v] * block->cut);
 		}
 		send_block(s, block, freshness, in, sent);
 		send_on(s, block, (double *)in);

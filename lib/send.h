@@ -19,16 +19,16 @@ struct sender {
 	uint64_t runs;           /* read by send_row */
 	uint32_t *surface;       /* [2P] material and side, an index of part */
 	lanes *part;             /* [2 materials][PARTS][vectors] of flux arriving */
+	lanes *share;            /* [2 materials][2][vectors] of what leaves by lobes, by R and T */
 	lanes *unshot_diffuse;   /* [2P][vectors] as in solution.h, see sender_load */
 	lanes *unshot_link;      /* [links][2][vectors] */
-	double *link_gain;       /* [2P] flux that came to the links of a side, in all channels,
-	                            to rounding, since the owner set it to 0 */
-	void *room[3];           /* memory of these */
+	void *room[4];           /* memory of these */
 	double *chain_flux;      /* [chains][channels], 0 between rows */
 	uint32_t *touched;       /* chains with flux */
 	uint8_t *is_touched;
 	size_t touches;
 	double bytes;            /* of runs read by it */
+	struct exact *exact;     /* NULL, or flux is sent without loss to rounding */
 };
 
 /* What becomes of flux arriving: reflected and transmitted diffusely, by all finite
@@ -56,10 +56,20 @@ void sender_free(struct sender *s);
 int sender_load(struct sender *s, const struct solution *sol, struct err *e);
 void sender_store(const struct sender *s, struct solution *sol);
 
+/* The shares of what leaves a side by its lobes that go by R and by T, [2][vectors]. */
+static inline const lanes *sender_share(const struct sender *s, uint32_t ps)
+{
+	return s->share + s->surface[ps] * 2 * s->vectors;
+}
+
 /* Sends flux, which may be negative, by a row into the sender's unshot flux; adds to
  * `sent`. */
 void send_row(struct sender *s, uint32_t row, int freshness, const lanes *flux,
               struct sent *sent);
+
+/* Fetches a row that is sent soon: what says where it is (ahead 3), its runs (2), and what
+ * they add to (1), each by what the one before fetched. */
+void send_fetch(const struct sender *s, uint32_t row, int freshness, int ahead);
 
 /* The flux that comes in by each block of a row, [blocks of the row][channels],
  * when the row sends flux[channels]. */

@@ -8,9 +8,9 @@
 #include "model.h"
 
 /* The priority that the current round of shots asks for, and the next patch-side in it;
- * how many shots had been taken when the rate of convergence was last looked at, and what
- * was unshot then. */
-enum { ROUND_LEAST, ROUND_NEXT, ROUND_SHOTS, ROUND_UNSHOT, ROUND_TERMS };
+ * how many sums by patch have been read since the rate of convergence was last looked at,
+ * and what was unshot then. */
+enum { ROUND_LEAST, ROUND_NEXT, ROUND_WORK, ROUND_UNSHOT, ROUND_TERMS };
 
 /* Index of element-side s, band b, group g: ((g 2E + s) bands + b). The solver keeps
  * groups and bands together, as channels: g bands + b. */

@@ -10,15 +10,20 @@
 
 /* ---- the beginning and the end ---- */
 
+/* Less is no light: what becomes of it would not have all its digits. */
+static const double dimmest = 1e-200;
+
 double solver_emitted(const struct model *m, uint32_t source, int band)
 {
+	double flux = 0;
+
 	if (source >= 2 * m->patches)
-		return light_flux(m, source - 2 * m->patches, band);
-	if (!model_side_modelled(m, source))
-		return 0;
-	return m->patch_area[source >> 1] *
-	       bsdf_exitance(&m->material, model_patch_material(m, source >> 1),
-	                     (int)(source & 1), band);
+		flux = light_flux(m, source - 2 * m->patches, band);
+	else if (model_side_modelled(m, source))
+		flux = m->patch_area[source >> 1] *
+		       bsdf_exitance(&m->material, model_patch_material(m, source >> 1),
+		                     (int)(source & 1), band);
+	return flux > dimmest ? flux : 0;
 }
 
 static void weigh_components(struct solver *v)
@@ -33,10 +38,33 @@ static void weigh_components(struct solver *v)
 	for (size_t i = 0; i < v->parts.n; i++)
 		for (size_t c = 0; c < v->sender.channels; c++) {
 			double emitted = v->emitted[i * s->groups + c / bands];
-			double weight = emitted > 0 ? 1 / emitted : 0;
-			((double *)(v->weight + i * vectors))[c] = weight;
-			v->weight_max[i] = fmax(v->weight_max[i], weight);
+			((double *)(v->weight + i * vectors))[c] = emitted > 0 ? 1 / emitted : 0;
 		}
+}
+
+static double row_cost(const struct transport *t, uint32_t row)
+{
+	/* Runs that a block's head and an account of the shot are worth. */
+	enum { HEAD = 16 };
+	uint64_t b = t->row_block[row], end = t->row_block[row + 1];
+
+	return (double)(t->block[end].run - t->block[b].run + HEAD * (1 + end - b));
+}
+
+static void set_costs(struct solver *v)
+{
+	const struct transport *t = v->t;
+
+	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++) {
+		uint32_t row[2] = { t->diffuse_row[ps], t->emission_row[ps] };
+		v->cost[ps] = row[0] == FF_NO_ROW && row[1] == FF_NO_ROW;
+		for (int k = 0; k < 2; k++)
+			v->cost[ps] = fmax(v->cost[ps], row[k] == FF_NO_ROW ? 0 : row_cost(t, row[k]));
+	}
+	for (size_t l = 0; l < t->links; l++)
+		for (size_t way = 0; way < 2; way++)
+			if (t->link_row[2 * l + way] != FF_NO_ROW)
+				v->link_cost[l] += row_cost(t, t->link_row[2 * l + way]);
 }
 
 static int new_arrays(struct solver *v, struct err *e)
@@ -44,17 +72,15 @@ static int new_arrays(struct solver *v, struct err *e)
 	size_t parts = v->parts.n, vectors = v->sender.vectors, sides = v->s->patch_sides;
 
 	v->emitted = mem_new(parts * v->s->groups, sizeof *v->emitted, "priorities", e);
-	v->weight_max = mem_new(parts, sizeof *v->weight_max, "priorities", e);
-	v->priority = mem_new(sides, sizeof *v->priority, "priorities", e);
-	v->links = mem_new(sides, sizeof *v->links, "priorities", e);
+	v->cost = mem_new(sides, sizeof *v->cost, "priorities", e);
+	v->link_cost = mem_new(v->t->links, sizeof *v->link_cost, "priorities", e);
 	v->weight = lanes_new(parts * vectors, &v->room[0], "priorities", e);
 	v->out = lanes_new(vectors, &v->room[1], "flux", e);
 	v->emission = lanes_new(vectors, &v->room[2], "flux", e);
 	v->diffuse = lanes_new(vectors, &v->room[3], "flux", e);
 	v->unshot = lanes_new(vectors, &v->room[4], "flux", e);
 	v->part = lanes_new(parts * vectors, &v->room[5], "priorities", e);
-	return v->emitted && v->part && v->weight_max && v->priority && v->links && v->weight &&
-	       v->out && v->emission && v->diffuse && v->unshot ? 0 : -1;
+	return v->emitted && v->part && v->cost && v->link_cost && v->weight && v->out && v->emission && v->diffuse && v->unshot ? 0 : -1;
 }
 
 int solver_init(struct solver *v, struct solution *s, const struct transport *t,
@@ -66,9 +92,7 @@ int solver_init(struct solver *v, struct solution *s, const struct transport *t,
 	    new_arrays(v, e))
 		return -1;
 	weigh_components(v);
-	for (uint32_t ps = 0; ps < s->patch_sides; ps++)
-		v->sides += t->diffuse_row[ps] != FF_NO_ROW || t->emission_row[ps] != FF_NO_ROW ||
-		            t->target_link[ps] < t->target_link[ps + 1];
+	set_costs(v);
 	return 0;
 }
 
@@ -77,9 +101,8 @@ void solver_free(struct solver *v)
 	for (size_t i = 0; i < sizeof v->room / sizeof *v->room; i++)
 		free(v->room[i]);
 	free(v->emitted);
-	free(v->weight_max);
-	free(v->priority);
-	free(v->links);
+	free(v->cost);
+	free(v->link_cost);
 	sent_free(&v->sent);
 	sender_free(&v->sender);
 	components_free(&v->parts);
@@ -101,22 +124,52 @@ static void check_ledger(struct solver *v)
 	}
 }
 
-/* Counts unshot flux of a source; its magnitude by weight. */
-static double count(struct solver *v, uint32_t source, const lanes *flux)
-{
-	const size_t vectors = v->sender.vectors;
-	const lanes *weight = v->weight + v->parts.of[source] * vectors;
-	lanes *part = v->part + v->parts.of[source] * vectors, sum = { 0 }, below = { 0 };
+enum { FEW = 2 };
 
-	for (size_t i = 0; i < vectors; i++) {
-		lanes magnitude = lanes_abs(flux[i]), weighted = magnitude * weight[i];
-		v->unshot[i] += flux[i];
-		part[i] += weighted;
-		sum += weighted;
-		below += magnitude - flux[i];
+static inline void raise(double *top, double x)
+{
+	if (x > *top)
+		*top = x;
+}
+
+/* Counts items of unshot flux of a source, each two at a cost; the largest magnitude by
+ * weight and cost. Inlined with the number of vectors, n; few are summed in registers. */
+static ALWAYS_INLINE double count_as(struct solver *v, uint32_t source, const lanes *flux,
+                                     size_t items, const double *cost, size_t n, int few)
+{
+	const lanes *weight = v->weight + v->parts.of[source] * n;
+	lanes here[2 * FEW] = { 0 }, below = { 0 };
+	lanes *all = few ? here : v->unshot;
+	lanes *part = few ? here + FEW : v->part + v->parts.of[source] * n;
+	double top = 0;
+
+	for (size_t k = 0; k < items; k++, flux += n) {
+		lanes sum = { 0 };
+		for (size_t i = 0; i < n; i++) {
+			lanes magnitude = lanes_abs(flux[i]), weighted = magnitude * weight[i];
+			all[i] += flux[i];
+			part[i] += weighted;
+			sum += weighted;
+			below += magnitude - flux[i];
+		}
+		raise(&top, lanes_total(&sum, 1) / cost[k >> 1]);
+	}
+	for (size_t i = 0; few && i < n; i++) {
+		v->unshot[i] += all[i];
+		v->part[v->parts.of[source] * n + i] += part[i];
 	}
 	v->negative |= lanes_total(&below, 1) > 0;
-	return lanes_total(&sum, 1);
+	return top;
+}
+
+static double count(struct solver *v, uint32_t source, const lanes *flux, size_t items,
+                    const double *cost)
+{
+	switch (v->sender.vectors) {
+	case 1: return count_as(v, source, flux, items, cost, 1, 1);
+	case FEW: return count_as(v, source, flux, items, cost, FEW, 1);
+	default: return count_as(v, source, flux, items, cost, v->sender.vectors, 0);
+	}
 }
 
 /* The most that a component has unshot of a group, over what it emits of it. */
@@ -145,8 +198,38 @@ static void load_emission(const struct solver *v, uint32_t source, lanes *to)
 	       v->s->unshot_emission + source * bands, bands * sizeof(double));
 }
 
+/* Magnitude of flux by weight. */
+static inline double weigh(const lanes *weight, const lanes *flux, size_t n)
+{
+	lanes sum = { 0 };
+
+	for (size_t i = 0; i < n; i++)
+		sum += lanes_abs(flux[i]) * weight[i];
+	return lanes_total(&sum, 1);
+}
+
+static const lanes *weight_of(const struct solver *v, uint32_t source)
+{
+	return v->weight + v->parts.of[source] * v->sender.vectors;
+}
+
+/* What a side emits and has to send diffusely, by weight. */
+static double weigh_own(const struct solver *v, uint32_t ps)
+{
+	const size_t bands = (size_t)v->s->bands, n = v->sender.vectors;
+	const double *emission = v->s->unshot_emission + ps * bands;
+	const double *weight = (const double *)weight_of(v, ps);
+	double flux = 0;
+
+	for (size_t k = 0; k < bands; k++)
+		flux += emission[k];
+	return flux * weight[solution_group(v->s, v->t->m, ps) * bands] +
+	       weigh(weight_of(v, ps), v->sender.unshot_diffuse + ps * n, n);
+}
+
 double solver_survey(struct solver *v, double *worst)
 {
+	const struct transport *t = v->t;
 	struct sender *s = &v->sender;
 	size_t vectors = s->vectors;
 	double top = 0;
@@ -154,23 +237,56 @@ double solver_survey(struct solver *v, double *worst)
 	memset(v->unshot, 0, vectors * sizeof *v->unshot);
 	memset(v->part, 0, v->parts.n * vectors * sizeof *v->part);
 	v->negative = 0;
-	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++) {
-		const uint64_t *first = v->t->target_link + ps;
-		v->links[ps] = s->link_gain[ps] = 0;
-		for (uint64_t l = 2 * first[0]; l < 2 * first[1]; l++)
-			v->links[ps] += count(v, ps, s->unshot_link + l * vectors);
-		load_emission(v, ps, v->emission);
-		v->priority[ps] = v->links[ps] + count(v, ps, v->emission) +
-		                  count(v, ps, s->unshot_diffuse + ps * vectors);
-		top = fmax(top, v->priority[ps]);
-	}
-	for (uint32_t i = (uint32_t)v->s->patch_sides; i < v->s->sources; i++) {
+	for (uint32_t i = 0; i < v->s->sources; i++) {
+		const int is_light = i >= v->s->patch_sides;
+		double no_cost = 1;
 		load_emission(v, i, v->emission);
-		count(v, i, v->emission);
+		count(v, i, v->emission, 1, &no_cost);
+		if (is_light)
+			continue;
+		uint64_t link = t->target_link[i], links = t->target_link[i + 1] - link;
+		raise(&top, weigh_own(v, i) / v->cost[i]);
+		count(v, i, s->unshot_diffuse + i * vectors, 1, v->cost + i);
+		raise(&top, count(v, i, s->unshot_link + 2 * link * vectors, 2 * links,
+		                  v->link_cost + link));
 	}
 	*worst = worst_part(v);
 	check_ledger(v);
 	return top;
+}
+
+/* ---- whose turn it is ---- */
+
+/* Whether flux is unshot, and has a priority. */
+static int reaches(double flux, double cost, double least)
+{
+	return flux > 0 && flux >= least * cost;
+}
+
+static int own_is_due(const struct solver *v, uint32_t ps, double least)
+{
+	return reaches(weigh_own(v, ps), v->cost[ps], least);
+}
+
+/* The first link of a side from l on that is due, by link and freshness; or where its
+ * links end. */
+static uint64_t next_link(const struct solver *v, uint32_t ps, uint64_t l, double least)
+{
+	const size_t n = v->sender.vectors;
+	const uint64_t end = 2 * v->t->target_link[ps + 1];
+	const lanes *weight = weight_of(v, ps), *flux = v->sender.unshot_link + l * n;
+
+	for (; l < end; l++, flux += n)
+		if (reaches(n == 1 ? weigh(weight, flux, 1) : weigh(weight, flux, n),
+		            v->link_cost[l >> 1], least))
+			break;
+	return l;
+}
+
+int solver_is_due(const struct solver *v, uint32_t ps, double least)
+{
+	return own_is_due(v, ps, least) ||
+	       next_link(v, ps, 2 * v->t->target_link[ps], least) < 2 * v->t->target_link[ps + 1];
 }
 
 /* ---- shots ---- */
@@ -199,32 +315,11 @@ void solver_send_diffuse(struct solver *v, uint32_t ps, const lanes *flux, doubl
 		shoot_row(v, v->t->diffuse_row[ps], MIXED, flux, NULL, shot);
 }
 
-void solver_lobe_shares(const struct solver *v, uint32_t ps, lanes *share)
-{
-	const struct model *m = v->t->m;
-	const struct materials *mt = &m->material;
-	uint32_t material = model_patch_material(m, ps >> 1);
-	size_t at = material_at(mt, material, (int)(ps & 1)), vectors = v->sender.vectors;
-	int lobe_r = bsdf_has_lobe(mt, material, (int)(ps & 1), 0);
-	int lobe_t = bsdf_has_lobe(mt, material, (int)(ps & 1), 1);
-	double *r = (double *)share, *t = (double *)(share + vectors);
-
-	memset(share, 0, 2 * vectors * sizeof *share);
-	for (size_t c = 0; c < v->sender.channels; c++) {
-		size_t k = c % (size_t)m->bands;
-		double rho = lobe_r ? mt->rho_s[at + k] : 0;
-		double tau = lobe_t ? mt->tau_s[at + k] : 0;
-		r[c] = rho + tau > 0 ? rho / (rho + tau) : 0;
-		t[c] = rho + tau > 0 ? 1 - r[c] : 0;
-	}
-}
-
 void solver_send_link(struct solver *v, uint64_t l, const lanes *flux, double *shot)
 {
 	const struct transport *t = v->t;
-	lanes share[2 * VECTORS_MAX];
+	const lanes *share = sender_share(&v->sender, t->link_target[l >> 1]);
 
-	solver_lobe_shares(v, t->link_target[l >> 1], share);
 	for (uint64_t way = 0; way < 2; way++) {
 		uint32_t row = t->link_row[(l & ~(uint64_t)1) + way];
 		if (row != FF_NO_ROW)
@@ -243,19 +338,41 @@ static void take(lanes *from, lanes *to, lanes *out, size_t vectors)
 	}
 }
 
-static void shoot_links(struct solver *v, uint32_t ps)
+/* Fetches what sending a link reads and writes. */
+static void fetch_link(const struct solver *v, uint32_t ps, uint64_t l, int ahead)
 {
+	const uint32_t *row = v->t->link_row + (l & ~(uint64_t)1);
+
+	for (int way = 0; l < 2 * v->t->target_link[ps + 1] && way < 2; way++)
+		if (row[way] != FF_NO_ROW)
+			send_fetch(&v->sender, row[way], (int)(l & 1), ahead);
+}
+
+/* Links are short, so that reading them is waiting for memory: each is looked for three
+ * ahead. Whether there were any. */
+static int shoot_links(struct solver *v, uint32_t ps, double least)
+{
+	enum { AHEAD = 3 };
 	const struct transport *t = v->t;
+	const uint64_t end = 2 * t->target_link[ps + 1];
 	size_t vectors = v->sender.vectors;
 	lanes now[VECTORS_MAX];
+	uint64_t l[AHEAD + 1] = { next_link(v, ps, 2 * t->target_link[ps], least) };
 
-	for (uint64_t l = 2 * t->target_link[ps]; l < 2 * t->target_link[ps + 1]; l++) {
-		lanes *u = v->sender.unshot_link + l * vectors;
-		if (!(lanes_magnitude(u, vectors) > 0))
-			continue;
-		take(u, now, v->out, vectors);
-		solver_send_link(v, l, now, v->s->shot);
+	if (l[0] == end)
+		return 0;
+	for (int k = 0; k < AHEAD; k++)
+		l[k + 1] = l[k] < end ? next_link(v, ps, l[k] + 1, least) : end;
+	while (l[0] < end) {
+		for (int k = AHEAD; k > 0; k--)
+			fetch_link(v, ps, l[k], k);
+		take(v->sender.unshot_link + l[0] * vectors, now, v->out, vectors);
+		solver_send_link(v, l[0], now, v->s->shot);
+		memmove(l, l + 1, AHEAD * sizeof *l);
+		if (l[AHEAD] < end)
+			l[AHEAD] = next_link(v, ps, l[AHEAD] + 1, least);
 	}
+	return 1;
 }
 
 void solver_book(struct solver *v, const lanes *out)
@@ -274,7 +391,7 @@ void solver_book(struct solver *v, const lanes *out)
 		s->ledger[LEDGER_LOST * channels + c] += lost[c];
 		s->ledger[LEDGER_CUT * channels + c] += cut[c];
 		v->guessed += ((const double *)v->sent.guessed)[c];
-		if (s->ledger[c] > 0)
+		if (taken && s->ledger[c] > 0)
 			v->residual = fmax(v->residual,
 			                   fabs(taken[c] - gone - kept[c]) / s->ledger[c]);
 	}
@@ -291,19 +408,28 @@ static void take_emission(struct solver *v, uint32_t source)
 		v->out[i] += v->emission[i];
 }
 
-void solver_shoot(struct solver *v, uint32_t ps)
+static void shoot_own(struct solver *v, uint32_t ps)
 {
 	const struct transport *t = v->t;
 	size_t vectors = v->sender.vectors;
 	uint32_t row = t->emission_row[ps] != FF_NO_ROW ? t->emission_row[ps] : t->diffuse_row[ps];
 
-	memset(v->out, 0, vectors * sizeof *v->out);
 	take_emission(v, ps);
 	take(v->sender.unshot_diffuse + ps * vectors, v->diffuse, v->out, vectors);
 	if (row != FF_NO_ROW)
 		shoot_row(v, row, FRESH, v->emission, NULL, v->s->shot);
 	solver_send_diffuse(v, ps, v->diffuse, v->s->shot);
-	shoot_links(v, ps);
+}
+
+void solver_shoot(struct solver *v, uint32_t ps, double least)
+{
+	const int own = own_is_due(v, ps, least);
+
+	memset(v->out, 0, v->sender.vectors * sizeof *v->out);
+	if (own)
+		shoot_own(v, ps);
+	if (!shoot_links(v, ps, least) && !own)
+		return;
 	solver_book(v, v->out);
 	v->s->shots++;
 }

@@ -19,13 +19,12 @@ struct solver {
 	lanes *diffuse;          /* [vectors] and what was to leave diffusely */
 	double *emitted;         /* [components][groups] flux, all bands */
 	lanes *weight;           /* [components][vectors] 1 / emitted, by group */
-	double *weight_max;      /* [components] the largest */
-	double *priority;        /* [2P] unshot flux by weight when the round began */
-	double *links;           /* [2P] its part of a side's links */
+	double *cost;            /* [2P] of sending what leaves a side diffusely, in runs */
+	double *link_cost;       /* [links] of sending what leaves by lobes */
 	lanes *part;             /* [components][vectors] unshot flux by weight */
 	lanes *unshot;           /* [vectors] in all, then */
 	int negative;            /* some of it is below 0 */
-	size_t sides;            /* that can shoot */
+	uint64_t counted;        /* sender.runs that round[ROUND_WORK] has */
 	double guessed, residual;
 	void *room[6];           /* memory of the vectors */
 };
@@ -35,16 +34,20 @@ int solver_init(struct solver *v, struct solution *s, const struct transport *t,
                 struct err *e);
 void solver_free(struct solver *v);
 
-/* Flux that a source emits. */
+/* Flux that a source emits; 0 if it is too dim to compute with. */
 double solver_emitted(const struct model *m, uint32_t source, int band);
 
-/* Looks at all unshot flux: priority, links, unshot, negative. Returns the
- * largest priority; the worst component's and group's unshot over emitted flux goes to
+/* Looks at all unshot flux: unshot, negative. Returns the largest priority, which is flux
+ * by weight and cost; the worst component's and group's unshot over emitted flux goes to
  * *worst. Checks the ledger. O(sides + links). */
 double solver_survey(struct solver *v, double *worst);
 
-/* Sends all unshot flux of a patch-side; all of a light. */
-void solver_shoot(struct solver *v, uint32_t ps);
+/* Whether a patch-side has anything of that priority: what it emits and what is to leave
+ * diffusely, or what is to leave by the lobes of a link, fresh or mixed. */
+int solver_is_due(const struct solver *v, uint32_t ps, double least);
+
+/* A shot of what has that priority, if anything; one of all of a light. */
+void solver_shoot(struct solver *v, uint32_t ps, double least);
 void solver_shoot_light(struct solver *v, uint32_t source);
 
 /* Sends flux to leave diffusely by a side, or by the lobes of link index l (2 link +
@@ -53,10 +56,8 @@ void solver_shoot_light(struct solver *v, uint32_t source);
 void solver_send_diffuse(struct solver *v, uint32_t ps, const lanes *flux, double *shot);
 void solver_send_link(struct solver *v, uint64_t l, const lanes *flux, double *shot);
 
-/* The shares of a target's directional flux that leave by R and by T, [2][vectors]. */
-void solver_lobe_shares(const struct solver *v, uint32_t ps, lanes *share);
-
-/* Books v->sent in the ledger, where `out` was taken from unshot flux. */
+/* Books v->sent in the ledger, where `out` was taken from unshot flux; NULL if that is
+ * accounted for (send_exact.h). */
 void solver_book(struct solver *v, const lanes *out);
 
 /* Brings unshot / emitted of every component and group well below `stop`: GMRES for

@@ -23,7 +23,7 @@
 enum { STEPS = 64 };
 
 /* What is not proved to be smaller than this part of the bound is worth a step more. */
-static const double loose = .05;
+static const double loose = .15;
 
 struct tail {
 	const struct transport *t;
@@ -33,7 +33,8 @@ struct tail {
 	double *row;          /* [rows][bands] what a row makes of D, or of 1 + N */
 	lanes *d;             /* [2][2P][vectors] D: of all reflections, of all but lobes */
 	lanes *n;             /* the same of N, later 1 + N */
-	double *ratio;        /* [components] q */
+	double *ratio;        /* [components][bands] q */
+	uint8_t dark[BANDS_MAX]; /* bands without unshot flux: they need no bound */
 	double bytes;         /* of runs read */
 };
 
@@ -53,19 +54,34 @@ static void unit_rows(struct tail *x, struct sender *sender)
 	}
 }
 
-/* What a block's runs make of unit flux by unit of value, for a vector of bands. */
+/* What plain runs make of unit flux by unit of value, for a vector of bands of n. Sums by
+ * turns, as one addition would wait for the last. */
+static ALWAYS_INLINE lanes plain_step(const struct transport *t, const lanes *of, uint64_t i,
+                                      uint64_t end, size_t n)
+{
+	lanes sum[4] = { 0 };
+
+	for (; i + 3 < end; i += 4)
+		for (size_t k = 0; k < 4; k++)
+			sum[k] += t->run_sum[i + k] * of[t->run_target[i + k] * n];
+	for (; i < end; i++)
+		sum[0] += t->run_sum[i] * of[t->run_target[i] * n];
+	return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+/* What a block's runs make of it. */
 static lanes block_step(const struct tail *x, const lanes *of, uint64_t b, size_t v)
 {
 	const struct transport *t = x->t;
 	const struct block *block = &t->block[b];
-	const lanes *without = of + 2 * t->m->patches * x->vectors;
-	lanes sum = { 0 };
+	const size_t n = x->vectors;
+	const lanes *without = of + 2 * t->m->patches * n;
+	lanes sum = n == 1 ? plain_step(t, of, block->run, block->ideal, 1)
+	                   : plain_step(t, of + v, block->run, block->ideal, n);
 
-	for (uint64_t i = block->run; i < block->ideal; i++)
-		sum += t->run_sum[i] * of[t->run_target[i] * x->vectors + v];
 	for (uint64_t i = block->ideal; i < block[1].run; i++) {
 		int followed = t->run_link[block->link + (i - block->special)] == RUN_FOLLOWED;
-		sum += t->run_sum[i] * (followed ? without : of)[t->run_target[i] * x->vectors + v];
+		sum += t->run_sum[i] * (followed ? without : of)[t->run_target[i] * n + v];
 	}
 	return sum;
 }
@@ -128,17 +144,17 @@ static void sides_step(struct tail *x)
 {
 	const struct model *m = x->t->m;
 
-	memset(x->ratio, 0, x->parts->n * sizeof *x->ratio);
+	memset(x->ratio, 0, x->parts->n * x->bands * sizeof *x->ratio);
 	for (size_t i = 0; i < 4 * m->patches; i++) {
 		uint32_t ps = (uint32_t)(i % (2 * m->patches));
 		double *d = (double *)(x->d + i * x->vectors);
 		double *n = (double *)(x->n + i * x->vectors);
-		double *ratio = &x->ratio[x->parts->of[ps]];
+		double *ratio = x->ratio + x->parts->of[ps] * x->bands;
 		for (size_t k = 0; k < x->bands; k++) {
 			double next = model_side_modelled(m, ps)
 			            ? side_step(x, ps, i < 2 * m->patches, k) : 0;
 			if (next > 0)
-				*ratio = fmax(*ratio, next / d[k]);
+				ratio[k] = fmax(ratio[k], next / d[k]);
 			d[k] = next;
 			n[k] += next;
 		}
@@ -155,7 +171,9 @@ static double remainder_of(struct tail *x, int add)
 		for (size_t k = 0; k < x->bands; k++) {
 			double d = ((double *)(x->d + i * x->vectors))[k];
 			double *n = (double *)(x->n + i * x->vectors) + k;
-			double q = x->ratio[x->parts->of[i % (2 * x->t->m->patches)]];
+			double q = x->ratio[x->parts->of[i % (2 * x->t->m->patches)] * x->bands + k];
+			if (x->dark[k])
+				continue;
 			double rest = !(d > 0) ? 0 : q < 1 ? d * q / (1 - q) : INFINITY;
 			worst = fmax(worst, isfinite(rest) ? rest / (1 + *n + rest) : INFINITY);
 			if (add)
@@ -222,6 +240,22 @@ static double all_bounds(const struct tail *x, const struct solution *s)
 	return sum;
 }
 
+static void find_dark(struct tail *x, const struct solution *s)
+{
+	const struct {
+		const double *flux;
+		size_t n;
+	} list[] = { { s->unshot_emission, s->sources * x->bands },
+	             { s->unshot_diffuse, s->patch_sides * solution_channels(s) },
+	             { s->unshot_link, 2 * s->links * solution_channels(s) } };
+
+	memset(x->dark, 1, sizeof x->dark);
+	for (size_t l = 0; l < sizeof list / sizeof *list; l++)
+		for (size_t i = 0; i < list[l].n; i++)
+			if (list[l].flux[i] != 0)
+				x->dark[i % x->bands] = 0;
+}
+
 double radiosity_tail_bound(const struct transport *t, const struct components *parts,
                             const struct solution *s, int threads, double *bytes)
 {
@@ -235,11 +269,12 @@ double radiosity_tail_bound(const struct transport *t, const struct components *
 
 	x.in = mem_new(t->blocks, bands * sizeof(double), "bound", &e);
 	x.row = mem_new(t->rows, bands * sizeof(double), "bound", &e);
-	x.ratio = mem_new(parts->n, sizeof *x.ratio, "bound", &e);
+	x.ratio = mem_new(parts->n, bands * sizeof *x.ratio, "bound", &e);
 	x.d = lanes_new(4 * t->m->patches * x.vectors, &room[0], "bound", &e);
 	x.n = lanes_new(4 * t->m->patches * x.vectors, &room[1], "bound", &e);
 	if (sender_init(&sender, t, 1, &e) == 0 && x.in && x.row && x.ratio && x.d && x.n) {
 		unit_rows(&x, &sender);
+		find_dark(&x, s);
 		if (arrivals(&x, threads)) {
 			all_rows(&x, x.n, threads);
 			bound = all_bounds(&x, s);

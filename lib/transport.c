@@ -347,6 +347,49 @@ static void fill_rows(void *arg, size_t begin, size_t end, int thread)
 	}
 }
 
+/* ---- what is followed on ---- */
+
+/* Adds what a run sends on by one event to the block's list from `first` on. */
+static int add_onward(struct vec *list, size_t first, struct onward x, struct err *e)
+{
+	struct onward *o = list->data;
+
+	for (size_t i = first; i < list->n; i++)
+		if (o[i].event == x.event) {
+			o[i].sum += x.sum;
+			return 0;
+		}
+	return vec_append(list, &x, 1, sizeof x, e);
+}
+
+/* O(runs that are followed). */
+static int list_onward(struct transport *t, struct err *e)
+{
+	const struct chains *c = &t->chains;
+	const uint32_t *all = c->child.data;
+	struct vec list = { 0 };
+	int bad = 0;
+
+	for (size_t b = 0; b < t->blocks; b++) {
+		struct block *block = &t->block[b];
+		const uint32_t *child = all + (size_t)block->chain * c->events;
+		block->onward = list.n;
+		for (uint64_t i = block->ideal; i < block[1].run && !bad; i++) {
+			uint32_t ps = t->run_target[i], way[2];
+			uint32_t first = 4 * model_patch_material(t->m, ps >> 1) + 2 * (ps & 1);
+			int lobes = t->run_link[block->link + (i - block->special)] == RUN_FOLLOWED;
+			memcpy(way, c->slot + first, sizeof way);
+			for (uint32_t k = 0; k < 2 && !bad; k++)
+				if (way[k] != CHAIN_NONE && (lobes || !c->finite[way[k]]))
+					bad = add_onward(&list, block->onward, (struct onward){ child[way[k]],
+					                 first + k, t->run_sum[i] }, e);
+		}
+	}
+	t->block[t->blocks].onward = list.n;
+	t->onward = list.data;
+	return bad ? -1 : 0;
+}
+
 static int make_runs(struct transport *t, const struct link_key *link, int threads,
                      struct err *e)
 {
@@ -370,6 +413,7 @@ static int make_runs(struct transport *t, const struct link_key *link, int threa
 		memset(p.has, 0, t->chains.n * (size_t)(threads > 1 ? threads : 1) * sizeof *p.has);
 	if (!bad)
 		par_for(t->rows, 64, threads, fill_rows, &p, NULL);
+	bad = bad || list_onward(t, e);
 	free(p.kind);
 	free(p.target);
 	free(p.sum);
@@ -423,7 +467,7 @@ void transport_free(struct transport *t)
 {
 	void *array[] = { t->row_side, t->row_kind, t->row_samples, t->row_block,
 		t->diffuse_row, t->emission_row, t->light_row, t->block, t->run_target, t->run_sum,
-		t->run_link, t->link_target, t->link_row, t->target_link };
+		t->run_link, t->onward, t->link_target, t->link_row, t->target_link };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);

@@ -25,8 +25,17 @@ struct block {
 	uint64_t special;    /* first run on a special side */
 	uint64_t ideal;      /* first run that the row follows on */
 	uint64_t link;       /* run_link of the first special run */
+	uint64_t onward;     /* first; ends where the next block's begins */
 	double sum;          /* runs + the rest below: what comes in by this chain */
 	double escape, black, lost, cut;
+};
+
+/* Light of a block that the row follows on, from all its runs with the same event. */
+struct onward {
+	uint32_t chain;      /* where it comes to: the block's own where counts have stopped,
+	                        CHAIN_NONE if no sample followed it */
+	uint32_t event;      /* id: ff.h */
+	double sum;          /* of the runs' values */
 };
 
 /* A run_link: the link, with the bit set if it is the nearest in direction and not the
@@ -54,6 +63,7 @@ struct transport {
 	uint32_t *run_target;            /* [runs] patch-side */
 	double *run_sum;                 /* [runs] of the values */
 	uint32_t *run_link;              /* [special_runs] */
+	struct onward *onward;
 
 	size_t links;                    /* sorted by target, chain, source */
 	uint32_t *link_target;

@@ -283,7 +283,7 @@ void verify_solution(const struct model *m, const struct solution *s, struct ver
 		                        emitted);
 	}
 	add(v, "ledger: emitted - absorbed - escaped - lost - cut - unshot", "of what is emitted",
-	    residual, 1e-12);
+	    residual, 1e-13);
 	add(v, "elements: absorbed flux against the ledger", "of what is emitted", missing, 1e-9);
 	add(v, "unshot", "of what is emitted", left, (double)INFINITY);
 }

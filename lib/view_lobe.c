@@ -12,8 +12,7 @@ static const double pi = 3.14159265358979323846;
 
 enum {
 	PARTS = 4,             /* of the samples, that a standard error comes from */
-	FIRST = 4, MOST = 64,  /* samples of a part where an error is aimed at; fewer at first */
-	FEWEST = 2,            /* where a pixel has several places */
+	FIRST = 4, MOST = 64,  /* samples of a part where an error is aimed at */
 	PROBES = 8             /* of each of two parts that tell how far one ray is off */
 };
 
@@ -195,7 +194,7 @@ static int settled(const struct run *r, double n)
 /* As many samples as it takes: returns their number. */
 static uint32_t follow_until(struct run *r)
 {
-	uint32_t each = r->w->o->samples >= FIRST / FEWEST ? FEWEST : FIRST;
+	uint32_t each = FIRST;
 
 	for (uint32_t i = 0; i < PARTS * each; i++)
 		follow_both(r, i, &r->part[i / each]);

@@ -53,7 +53,7 @@ struct job {
 	FILE *log;
 	struct progress progress;   /* by the logarithm of what is unshot */
 	double begun;
-	double prepare_seconds, solve_seconds, gather_seconds;
+	double prepare_seconds, solve_seconds, gather_seconds, estimate_seconds;
 };
 
 static void parse(struct cli *c, int argc, char **argv, struct request *r)
@@ -253,7 +253,7 @@ static int solve(struct job *j, struct err *e)
 {
 	struct radiosity_hooks hooks = { log_step, j };
 	struct cli_progress bar;
-	double t0 = cli_seconds(), t1, t2;
+	double t0 = cli_seconds(), t1, t2, t3;
 
 	if (transport_init(&j->t, &j->m, j->ff, j->name, j->r->shards, j->cli->threads, e))
 		return -1;
@@ -270,12 +270,15 @@ static int solve(struct job *j, struct err *e)
 	if (bad)
 		return -1;
 	t2 = cli_seconds();
-	if (radiosity_gather(&j->s, &j->t, j->cli->threads, &j->report, e) ||
-	    discretisation_estimate(&j->m, &j->s, j->cli->threads, e))
+	if (radiosity_gather(&j->s, &j->t, j->cli->threads, &j->report, e))
+		return -1;
+	t3 = cli_seconds();
+	if (discretisation_estimate(&j->m, &j->s, j->cli->threads, e))
 		return -1;
 	j->prepare_seconds = t1 - t0;
 	j->solve_seconds = t2 - t1;
-	j->gather_seconds = cli_seconds() - t2;
+	j->gather_seconds = t3 - t2;
+	j->estimate_seconds = cli_seconds() - t3;
 	return 0;
 }
 
@@ -363,10 +366,10 @@ static void print_report(const struct job *j)
 	if (r->guessed > 0)
 		fprintf(out, "directions    %.3g of what is emitted used the nearest known direction\n",
 		       r->guessed);
-	fprintf(out, "seconds       %.3f join, %.3f shoot, %.3f elements (%.2f GB/s of form factors)\n",
-	       j->prepare_seconds, j->solve_seconds, j->gather_seconds,
+	fprintf(out, "seconds       %.3f join, %.3f shoot, %.3f elements (%.2f GB/s of form factors), "
+	        "%.3f estimate\n", j->prepare_seconds, j->solve_seconds, j->gather_seconds,
 	       (r->solve_bytes + r->gather_bytes) /
-	       (j->solve_seconds + j->gather_seconds) * 1e-9);
+	       (j->solve_seconds + j->gather_seconds) * 1e-9, j->estimate_seconds);
 	fprintf(out, "peak memory   %.0f MB\n", cli_peak_megabytes());
 }
 

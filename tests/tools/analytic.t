@@ -136,7 +136,7 @@ says() {
 	ffcalc -m analytic $2 -n 64 "$T/b.mesh" -o "$T/b.ff" >"$T/said" 2>&1
 	check "$4" grep -q "$3" "$T/said"
 }
-says two-pass "-t .1" '^by rays  *light from 1 of 254 patch-sides: they are curved$' 'says how many patch-sides are curved'
+says two-pass "-t .1" '^by rays  *light from 1 of 262 patch-sides: they are curved$' 'says how many patch-sides are curved'
 says two-pass "--to patches -t .1" '^by rays .*: there are lobes, mirrors or panes$' 'says that lobes need rays'
 says mirror-image "--to patches" '^by rays .*: there are lobes, mirrors or panes$' 'says that mirrors need rays'
 says cornell "" '^pairs .* sampled$' 'a few rays do as well'

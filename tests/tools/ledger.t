@@ -32,7 +32,7 @@ unshot = sum(a[n].reshape(-1, len(emitted)).sum(0)
              for n in ("unshot_emission", "unshot_diffuse", "unshot_link") if a[n].size)
 residual = np.abs(emitted - sum(gone) - unshot) / emitted.max()
 print("residual", residual.max())
-sys.exit(not residual.max() <= 1e-12)' "$1"
+sys.exit(not residual.max() <= 1e-13)' "$1"
 }
 
 for file in "$scenes"/*.gltf; do

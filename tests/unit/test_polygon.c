@@ -350,6 +350,63 @@ static void test_joint(void **state)
 	assert_true(used > 1000);
 }
 
+/* Four pairs at a time: as one by one, the same bits whichever facet of a pair is given. */
+static void test_joint_table(void **state)
+{
+	enum { N = 40 };
+	const double tolerance = 8e-7, near = 1e-9;
+	struct dice d = { 19, 0 };
+	double v[N][12], one[JOINT_ONE], x[4], other[4], low, high;
+	struct facet f[N];
+	struct joint joint[N];
+	struct joint_table t;
+	struct err e = { 0 };
+	int reached = 0, behind = 0;
+
+	(void)state;
+	for (int i = 0; i < N; i++) {
+		double at[3];
+		for (int k = 0; k < 3; k++)
+			at[k] = i % 4 == 1 && k == 2 ? 0 : 8 * roll(&d, -1, 1);
+		random_parallelogram(&d, .3, 0, at, v[i]);
+		for (int k = 0; i % 4 == 1 && k < 4; k++)
+			v[i][3 * k + 2] = 0; /* many in one plane */
+		f[i] = facet_of(i % 7 ? 4 : 3, v[i]);
+		joint_fill(&f[i], &joint[i]);
+	}
+	assert_int_equal(joint_table_new(f, joint, N, tolerance, near, &t, &e), 0);
+	for (size_t i = 0; i < N; i++)
+		for (size_t j = 0; j < N; j++) {
+			joint_one(&t, i, one);
+			int known = joint_four(&t, one, j, 0, x) & 1;
+			joint_one(&t, j, one);
+			assert_int_equal(known, joint_four(&t, one, i, 1, other) & 1);
+			int front = in_front(&f[i], &f[j]) && in_front(&f[j], &f[i]);
+			if (!known) {
+				assert_true(i == j || !front || !joint_reaches(&f[i], &joint[i], &f[j],
+				                                               &joint[j], .999 * tolerance) ||
+				            v3_dot(f[i].normal, f[j].centre) - f[i].offset < f[j].radius ||
+				            v3_dot(f[j].normal, f[i].centre) - f[j].offset < f[i].radius);
+				continue;
+			}
+			assert_true(x[0] == other[0]);
+			if (x[0] > 0) {
+				double exact = joint_exchange(&f[i], &joint[i], &f[j], &joint[j]);
+				assert_true(front);
+				assert_near(x[0], exact, 1e-13 * exact);
+				reached++;
+				continue;
+			}
+			facet_heights(&f[j], f[i].normal, f[i].offset, &low, &high);
+			if (high > near)
+				facet_heights(&f[i], f[j].normal, f[j].offset, &low, &high);
+			assert_true(high <= near);
+			behind++;
+		}
+	assert_true(reached > 100 && behind > 100);
+	joint_table_free(&t);
+}
+
 /* What is chosen for a pair, far, near, unequal or touching: within what was asked for. */
 static void test_clear(void **state)
 {
@@ -475,7 +532,7 @@ int main(void)
 		cmocka_unit_test(test_both_ways),
 		cmocka_unit_test(test_cubature_reach),
 		cmocka_unit_test(test_cubature_weights),
-		cmocka_unit_test(test_joint),
+		cmocka_unit_test(test_joint), cmocka_unit_test(test_joint_table),
 		cmocka_unit_test(test_clear),
 		cmocka_unit_test(test_facet_parts),
 		cmocka_unit_test(test_facet_clip),

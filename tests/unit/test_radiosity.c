@@ -11,10 +11,9 @@
 
 #include "../../formats/ff_file.h"
 #include "../../lib/bsdf.h"
-#include "../../lib/radiosity.h"
 #include "../../lib/solver.h"
 #include "grid.h"
-#include "memory_ff.h"
+#include "solved.h"
 
 static const double zero[3] = { 0, 0, 0 }, one[3] = { 1, 1, 1 };
 
@@ -34,45 +33,18 @@ static void set_diffuse(struct model *m, size_t material, double rho, double exi
 	mt->emission[material_at(mt, material, FRONT)] = exitance / 3.14159265358979323846;
 }
 
-static void solution_of(const struct model *m, const struct ff *f, struct solution *s)
-{
-	const struct ff *shard[] = { f };
-	const char *name[] = { "memory" };
-	struct transport t;
-	struct err e = { 0 };
-	struct radiosity_options ro = { 1e-9, UINT64_MAX, 2 };
-	struct radiosity_report r;
-
-	assert_int_equal(transport_init(&t, m, shard, name, 1, 2, &e), 0);
-	assert_int_equal(solution_begin(s, m, &t, 0, &e), 0);
-	if (radiosity_shoot(s, &t, &ro, NULL, &r, &e)) {
-		print_error("%s\n", e.text);
-		fail();
-	}
-	assert_int_equal(radiosity_gather(s, &t, 2, &r, &e), 0);
-	assert_true(r.residual <= 1e-12);
-	transport_free(&t);
-}
-
 /* Solves; h[i] is the area mean of the irradiance of patch-side side[i]. */
 static void solve(const struct model *m, const struct ff_options *o, const uint32_t *side,
                   size_t n, double *h)
 {
-	struct ff f;
-	struct ff_stats stats;
-	struct solution s;
+	struct solved x;
 
-	memory_ff(m, o, &f, &stats);
-	solution_of(m, &f, &s);
-	for (size_t k = 0; k < n; k++) {
-		uint32_t p = side[k] >> 1;
-		h[k] = 0;
-		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++)
-			h[k] += solution_irradiance(&s, 2 * i + (side[k] & 1), 0) *
-			        m->element_area[i] / m->patch_area[p];
-	}
-	solution_free(&s);
-	ff_free(&f);
+	solved_begin(&x, m, o, 0);
+	solved_finish(&x, 1e-9);
+	assert_true(x.r.residual <= 1e-13);
+	for (size_t k = 0; k < n; k++)
+		h[k] = patch_mean(m, &x.s, side[k], 0);
+	solved_free(&x);
 }
 
 static void furnace(const struct ff_options *o, double tolerance)
@@ -181,23 +153,33 @@ static void plates_by_hemicubes(void **state)
 static void six_bands(void **state)
 {
 	struct model m;
-	struct ff f;
-	struct ff_stats stats;
-	struct solution s;
+	struct solved x;
 
 	(void)state;
 	plates_model(&m, 10, 6);
-	memory_ff(&m, &rays, &f, &stats);
-	solution_of(&m, &f, &s);
+	solved_begin(&x, &m, &rays, 0);
+	solved_finish(&x, 1e-9);
 	for (size_t i = 0; i < 2 * m.elements; i++)
 		for (int k = 1; k < 6; k++) {
-			double h = (k + 1) * solution_irradiance(&s, i, 0), e = (k + 1) * s.error[6 * i];
-			assert_true(fabs(solution_irradiance(&s, i, k) - h) <= 1e-12 * h);
-			assert_true(fabs(s.error[6 * i + (size_t)k] - e) <= 1e-5 * e);
+			double h = (k + 1) * solution_irradiance(&x.s, i, 0);
+			double e = (k + 1) * x.s.error[6 * i];
+			assert_true(fabs(solution_irradiance(&x.s, i, k) - h) <= 1e-12 * h);
+			assert_true(fabs(x.s.error[6 * i + (size_t)k] - e) <= 1e-5 * e);
 		}
-	solution_free(&s);
-	ff_free(&f);
+	solved_free(&x);
 	model_free(&m);
+}
+
+/* The solution by form factors, which stay with the caller. */
+static void solution_of(const struct model *m, const struct ff *f, struct solution *s)
+{
+	struct solved x;
+
+	solved_join(&x, m, NULL, f);
+	assert_int_equal(solution_begin(&x.s, m, &x.t, 0, &x.e), 0);
+	solved_finish(&x, 1e-9);
+	*s = x.s;
+	transport_free(&x.t);
 }
 
 /* Through a file whose receivers are patches or elements. */
@@ -219,17 +201,6 @@ static void solve_file(const struct model *m, const struct ff *f, int to_patches
 	solution_of(m, &file.f, s);
 	ff_file_close(&file);
 	unlink(path);
-}
-
-static double patch_mean(const struct model *m, const struct solution *s, uint32_t ps, int k)
-{
-	uint32_t p = ps >> 1;
-	double h = 0;
-
-	for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++)
-		h += solution_irradiance(s, 2 * i + (ps & 1), k) * m->element_area[i] /
-		     m->patch_area[p];
-	return h;
 }
 
 /* Patches as receivers: the same flux for each patch, the same irradiance all over it;
@@ -296,33 +267,29 @@ static void shards_of_two_kinds(void **state)
 	transport_free(&t);
 }
 
+/* A box whose first three walls have one albedo and emission, the others another. */
+static void box_model(struct model *m, const double rho[2], const double exitance[2])
+{
+	const uint32_t material[6] = { 0, 0, 0, 1, 1, 1 };
+
+	grid_new(m, 6, 4, 2, 1);
+	grid_box(m, 4, material, zero, one);
+	for (size_t k = 0; k < 2; k++)
+		set_diffuse(m, k, rho[k], exitance[k]);
+	grid_end(m);
+}
+
 static void white_box_has_no_steady_state(void **state)
 {
 	struct model m;
-	const uint32_t material[6] = { 0 };
-	struct ff f;
-	const struct ff *shard[] = { &f };
-	const char *name[] = { "memory" };
-	struct ff_stats stats;
-	struct transport t;
-	struct solution s;
-	struct radiosity_report r;
-	struct radiosity_options ro = { 1e-4, UINT64_MAX, 2 };
-	struct err e = { 0 };
+	struct solved x;
 
 	(void)state;
-	grid_new(&m, 6, 2, 1, 1);
-	grid_box(&m, 2, material, zero, one);
-	set_diffuse(&m, 0, 1, 1);
-	grid_end(&m);
-	memory_ff(&m, &rays, &f, &stats);
-	assert_int_equal(transport_init(&t, &m, shard, name, 1, 2, &e), 0);
-	assert_int_equal(solution_begin(&s, &m, &t, 0, &e), 0);
-	assert_int_equal(radiosity_shoot(&s, &t, &ro, NULL, &r, &e), -1);
-	assert_non_null(strstr(e.text, "no steady state"));
-	transport_free(&t);
-	solution_free(&s);
-	ff_free(&f);
+	box_model(&m, one, one);
+	solved_begin(&x, &m, &rays, 0);
+	assert_int_equal(solved_shoot(&x, 1e-4), -1);
+	assert_non_null(strstr(x.e.text, "no steady state"));
+	solved_free(&x);
 	model_free(&m);
 }
 
@@ -330,41 +297,20 @@ static void white_box_has_no_steady_state(void **state)
 static void white_furnace(double rho, double passes)
 {
 	struct model m;
-	struct ff f;
-	struct ff_stats stats;
-	struct transport t;
-	struct solution s;
-	struct err e = { 0 };
-	const uint32_t material[6] = { 0 };
-	const struct ff *shard[] = { &f };
-	const char *name[] = { "memory" };
-	struct radiosity_options o = { 1e-8, UINT64_MAX, 2 };
-	struct radiosity_report r;
+	struct solved x;
 	double exact = 1 / (1 - rho);
 
-	grid_new(&m, 6, 4, 1, 1);
-	grid_box(&m, 4, material, zero, one);
-	set_diffuse(&m, 0, rho, 1);
-	grid_end(&m);
-	memory_ff(&m, &rays, &f, &stats);
-	assert_int_equal(transport_init(&t, &m, shard, name, 1, 2, &e), 0);
-	assert_int_equal(solution_begin(&s, &m, &t, 0, &e), 0);
-	assert_int_equal(radiosity_shoot(&s, &t, &o, NULL, &r, &e), 0);
-	assert_int_equal(radiosity_gather(&s, &t, 2, &r, &e), 0);
-	double absorbed = (1 - rho) * s.ledger[0] * exact;
-	assert_true(fabs(s.ledger[LEDGER_ABSORBED] / absorbed - 1) < r.bound);
-	assert_true(r.bound < 1e-7 * exact);
-	assert_true(r.passes <= passes);
-	assert_true(r.residual <= 1e-12);
-	for (size_t p = 0; p < m.patches; p++) {
-		double h = 0;
-		for (uint32_t i = m.patch_start[p]; i < m.patch_start[p + 1]; i++)
-			h += solution_irradiance(&s, 2 * i, 0) * m.element_area[i] / m.patch_area[p];
-		assert_true(fabs(h / exact - 1) < .05);
-	}
-	solution_free(&s);
-	transport_free(&t);
-	ff_free(&f);
+	box_model(&m, (double[]){ rho, rho }, one);
+	solved_begin(&x, &m, &rays, 0);
+	solved_finish(&x, 1e-8);
+	double absorbed = (1 - rho) * x.s.ledger[0] * exact;
+	assert_true(fabs(x.s.ledger[LEDGER_ABSORBED] / absorbed - 1) < x.r.bound);
+	assert_true(x.r.bound < 1e-7 * exact);
+	assert_true(x.r.passes <= passes);
+	assert_true(x.r.residual <= 1e-13);
+	for (uint32_t p = 0; p < m.patches; p++)
+		assert_true(fabs(patch_mean(&m, &x.s, 2 * p, 0) / exact - 1) < .05);
+	solved_free(&x);
 	model_free(&m);
 }
 
@@ -374,6 +320,7 @@ static void white_furnaces(void **state)
 	white_furnace(.99, 100);
 	white_furnace(.999, 100);
 	white_furnace(.9999, 100);
+	white_furnace(.99999, 100);
 }
 
 /* A box of two albedos stopped early: all that is still to arrive is below the bound, and
@@ -381,42 +328,24 @@ static void white_furnaces(void **state)
 static void bound_is_sharp(void **state)
 {
 	struct model m;
-	struct ff f;
-	struct ff_stats stats;
-	struct transport t;
-	struct solution s;
-	struct err e = { 0 };
-	const uint32_t material[6] = { 0, 0, 0, 1, 1, 1 };
-	const struct ff *shard[] = { &f };
-	const char *name[] = { "memory" };
-	double arrived[2];
-	struct radiosity_report r;
+	struct solved x;
+	double arrived[2], bound = 0;
 
 	(void)state;
-	grid_new(&m, 6, 4, 2, 1);
-	grid_box(&m, 4, material, zero, one);
-	set_diffuse(&m, 0, .9, 1);
-	set_diffuse(&m, 1, .3, 0);
-	grid_end(&m);
-	memory_ff(&m, &rays, &f, &stats);
-	assert_int_equal(transport_init(&t, &m, shard, name, 1, 2, &e), 0);
-	assert_int_equal(solution_begin(&s, &m, &t, 0, &e), 0);
+	box_model(&m, (double[]){ .9, .3 }, (double[]){ 1, 0 });
+	solved_begin(&x, &m, &rays, 0);
 	for (int k = 0; k < 2; k++) {
-		struct radiosity_options o = { k ? 1e-12 : .1, UINT64_MAX, 2 };
-		struct radiosity_report end;
-		assert_int_equal(radiosity_shoot(&s, &t, &o, NULL, k ? &end : &r, &e), 0);
-		assert_int_equal(radiosity_gather(&s, &t, 2, &end, &e), 0);
+		solved_finish(&x, k ? 1e-12 : .1);
+		bound = k ? bound : x.r.bound;
 		arrived[k] = 0;
 		for (size_t i = 0; i < m.elements; i++)
-			arrived[k] += m.element_area[i] * solution_irradiance(&s, 2 * i, 0);
+			arrived[k] += m.element_area[i] * solution_irradiance(&x.s, 2 * i, 0);
 	}
-	double missing = (arrived[1] - arrived[0]) / s.ledger[LEDGER_EMITTED];
+	double missing = (arrived[1] - arrived[0]) / x.s.ledger[LEDGER_EMITTED];
 	assert_true(missing > .1);
-	assert_true(missing <= r.bound * (1 + 1e-9));
-	assert_true(r.bound <= 1.1 * missing);
-	solution_free(&s);
-	transport_free(&t);
-	ff_free(&f);
+	assert_true(missing <= bound * (1 + 1e-9));
+	assert_true(bound <= 1.1 * missing);
+	solved_free(&x);
 	model_free(&m);
 }
 
@@ -427,7 +356,7 @@ static void shoot_all(struct solver *v)
 
 	for (int i = 0; i < 100000 && worst > 1e-13; i++) {
 		for (uint32_t ps = 0; ps < v->s->patch_sides; ps++)
-			solver_shoot(v, ps);
+			solver_shoot(v, ps, 0);
 		solver_survey(v, &worst);
 	}
 	assert_true(worst <= 1e-13);
@@ -449,45 +378,37 @@ static void assert_near(const double *a, const double *b, size_t n)
 static void overshooting(double exponent, int bands)
 {
 	struct model m;
-	struct ff f;
-	struct ff_stats stats;
-	struct transport t;
+	struct solved x;
 	struct solution s[2];
-	struct err e = { 0 };
-	const struct ff *shard[] = { &f };
-	const char *name[] = { "memory" };
 	struct ff_options o = rays;
-	struct radiosity_report r;
 
 	o.rays = o.lobe_rays = 512;
 	plates_model(&m, exponent, bands);
-	memory_ff(&m, &o, &f, &stats);
-	assert_int_equal(transport_init(&t, &m, shard, name, 1, 2, &e), 0);
+	solved_join(&x, &m, &o, NULL);
 	for (int k = 0; k < 2; k++) {
 		struct solver v;
 		double worst;
-		assert_int_equal(solution_begin(&s[k], &m, &t, 0, &e), 0);
-		assert_int_equal(solver_init(&v, &s[k], &t, &e), 0);
+		assert_int_equal(solution_begin(&x.s, &m, &x.t, 0, &x.e), 0);
+		assert_int_equal(solver_init(&v, &x.s, &x.t, &x.e), 0);
 		solver_survey(&v, &worst);
 		if (k == 0)
 			shoot_all(&v);
 		for (int i = 0; k == 1 && i < 3; i++)
-			assert_true(solver_overshoot(&v, 1, 1e-13, &e) >= 0);
+			assert_true(solver_overshoot(&v, 1, 1e-13, &x.e) >= 0);
 		solver_survey(&v, &worst);
 		assert_true(worst <= 1e-12);
-		assert_true(v.residual <= 1e-12);
-		sender_store(&v.sender, &s[k]);
+		assert_true(v.residual <= 1e-13);
+		sender_store(&v.sender, &x.s);
 		solver_free(&v);
-		assert_int_equal(radiosity_gather(&s[k], &t, 2, &r, &e), 0);
+		solved_gather(&x);
+		s[k] = x.s;
 	}
 	size_t n = s[0].element_sides * (size_t)bands;
 	assert_near(s[0].direct, s[1].direct, n);
 	assert_near(s[0].caustic, s[1].caustic, n);
 	assert_near(s[0].indirect, s[1].indirect, n);
-	for (int k = 0; k < 2; k++)
-		solution_free(&s[k]);
-	transport_free(&t);
-	ff_free(&f);
+	solution_free(&s[0]);
+	solved_free(&x);
 	model_free(&m);
 }
 
