@@ -265,7 +265,9 @@ static void gather_group(struct gather *g, struct gather_worker *w, size_t group
 					size_t at = (2 * (size_t)corner[from + i] + (size_t)side) * bands + b;
 					g->value[at] = (float)fmax(0, found.h[b] + p.shift[b]);
 					g->error[at] = (float)found.error[b];
-					g->common[at] = (float)found.common[b];
+					/* How light falls off at an edge is taken from the solution, which is too
+					 * coarse to know: what is added is as uncertain as it is large. */
+					g->common[at] = (float)hypot(found.common[b], p.shift[b]);
 				}
 		}
 	}

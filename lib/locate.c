@@ -61,26 +61,40 @@ static int fill_nodes(struct locator *l, struct vec *stack, uint32_t tri, struct
 	return 0;
 }
 
-/* The deepest node, or the element, that holds all of a cell: its corners, a little
- * inwards, go down the tree together for as long as they agree. Corners beyond the
- * triangle do not count. */
-static int32_t cell_node(const struct model *m, uint32_t tri, uint32_t n, uint32_t i, uint32_t j)
+/* A square of cells [i, i + size) x [j, j + size) of a triangle's grid of n x n, its corners a
+ * little inwards: a power of two of cells, so that the long edge is a diagonal of it or
+ * outside. Corners beyond the triangle do not count. */
+struct square {
+	uint32_t n, i, j, size;
+};
+
+/* The weights that the corners of a square have in a node. Returns how many there are. */
+static int square_weights(const struct locator_node *f, const struct square *q, double w[4][3])
 {
 	const double in = 1e-6;
-	double w[4][3];
-	int32_t at = m->triangle_split[tri];
 	int corners = 0;
 
 	for (int k = 0; k < 4; k++) {
-		double x = (i + (k & 1 ? 1 - in : in)) / n, y = (j + (k >> 1 ? 1 - in : in)) / n;
-		if (x + y > 1)
+		double x = (q->i + (k & 1 ? q->size - in : in)) / q->n;
+		double y = (q->j + (k >> 1 ? q->size - in : in)) / q->n;
+		if (x + y > 1 + .5 / q->n)
 			continue;
-		w[corners][0] = 1 - x - y;
-		w[corners][1] = x;
-		w[corners++][2] = y;
+		for (int m = 0; m < 3; m++)
+			w[corners][m] = f->a[m] + f->b[m] * x + f->d[m] * y;
+		corners++;
 	}
+	return corners;
+}
+
+/* The deepest node below `at`, or the element, that holds all of a square: its corners go
+ * down the tree together for as long as they agree. */
+static int32_t square_node(const struct locator *l, int32_t at, const struct square *q)
+{
+	double w[4][3];
+	int corners = square_weights(&l->node[at], q, w);
+
 	while (at >= 0 && corners) {
-		const struct split *s = &m->split[at];
+		const struct split *s = &l->m->split[at];
 		int a = s->edge, b = a == 2 ? 0 : a + 1, second = w[0][a] < w[0][b];
 		for (int k = 1; k < corners; k++)
 			if ((w[k][a] < w[k][b]) != second)
@@ -95,6 +109,24 @@ static int32_t cell_node(const struct model *m, uint32_t tri, uint32_t n, uint32
 	return at;
 }
 
+/* Fills the cells of a square that lies in node `at`: a quarter at a time from the deepest
+ * node that holds it. */
+static void fill_square(const struct locator *l, int32_t *cell, int32_t at, struct square q)
+{
+	if (at >= 0)
+		at = square_node(l, at, &q);
+	if (at < 0 || q.size == 1) {
+		for (uint32_t j = q.j; j < q.j + q.size; j++)
+			for (uint32_t i = q.i; i < q.i + q.size; i++)
+				cell[j * q.n + i] = at;
+		return;
+	}
+	q.size /= 2;
+	for (uint32_t k = 0; k < 4; k++)
+		fill_square(l, cell, at, (struct square){ q.n, q.i + (k & 1) * q.size,
+		                                          q.j + (k >> 1) * q.size, q.size });
+}
+
 static int fill(struct locator *l, struct err *e)
 {
 	struct vec stack = { 0 };
@@ -105,8 +137,9 @@ static int fill(struct locator *l, struct err *e)
 			continue;
 		const struct locator_grid *g = &l->grid[l->root[t]];
 		bad = fill_nodes(l, &stack, t, e);
-		for (uint32_t k = 0; !bad && k < g->size * g->size; k++)
-			l->cell[g->first + k] = cell_node(l->m, t, g->size, k % g->size, k / g->size);
+		if (!bad)
+			fill_square(l, l->cell + g->first, l->m->triangle_split[t],
+			            (struct square){ g->size, 0, 0, g->size });
 	}
 	free(stack.data);
 	return bad;

@@ -123,7 +123,7 @@ static void follow_sample(const struct render *r, struct view_walker *w, int i, 
 	memset(w->emission, 0, bands * sizeof *w->emission);
 	memset(w->error, 0, bands * sizeof *w->error);
 	memset(w->axial, 0, bands * sizeof *w->axial);
-	w->probing = s == 0 && i % PROBE == PROBE / 2 && j % PROBE == PROBE / 2;
+	w->probing = s == 0 && !w->asking && i % PROBE == PROBE / 2 && j % PROBE == PROBE / 2;
 	camera_ray(r->f, i + r->spot[s][0], j + r->spot[s][1], b.org, b.dir);
 	view_follow(w, &b);
 }

@@ -107,7 +107,7 @@ static void put_request(struct view_walker *w, const struct view_branch *b, stru
 	view_shader_put(w->shader, &q, b->weight);
 }
 
-/* The error of interpolated light that a side shows, off[bands] of it here and across. */
+/* Adds the error of the interpolated light that a side shows. */
 static void add_error(struct view_walker *w, const struct view_branch *b, const struct point *p)
 {
 	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
@@ -236,6 +236,14 @@ static void branch_into(struct view_walker *w, const struct view_branch *b, cons
 	view_push(w, b, next, lobe->coefficient, scale);
 }
 
+/* How a mirror has turned what met none before: branches' `turns`. */
+static int turned(const struct view_scene *v, const struct point *p)
+{
+	int plane = view_images_plane(&v->images, p->material, p->side, p->n, p->x);
+
+	return plane < 0 ? -1 : 1 + plane;
+}
+
 /* Follows one directional part of a point: `through` 0 for reflection into the side
  * seen, 1 for light that comes from the other side. */
 static void branch_off(struct view_walker *w, const struct view_branch *b,
@@ -253,11 +261,8 @@ static void branch_off(struct view_walker *w, const struct view_branch *b,
 	leave(w->v, p, side, next.org);
 	next.passes = through && ideal && b->passes;
 	next.seed = rng_mix(b->seed + 1 + (uint64_t)through);
-	if (b->lobes && !through)
-		next.turns = b->turns == 0 ? 1 + view_images_plane(&w->v->images, p->material, p->side, p->n, p->x)
-		                           : -1;
-	if (b->lobes && (!ideal || (!through && next.turns == 0)))
-		next.turns = -1;
+	if (b->lobes && (!ideal || !through))
+		next.turns = ideal && b->turns == 0 ? turned(w->v, p) : -1;
 	if (ideal)
 		view_push(w, b, &next, lobe->coefficient, 1);
 	else if (!w->asking || !w->o->lobe_samples)
