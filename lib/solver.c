@@ -80,7 +80,8 @@ static int new_arrays(struct solver *v, struct err *e)
 	v->diffuse = lanes_new(vectors, &v->room[3], "flux", e);
 	v->unshot = lanes_new(vectors, &v->room[4], "flux", e);
 	v->part = lanes_new(parts * vectors, &v->room[5], "priorities", e);
-	return v->emitted && v->part && v->cost && v->link_cost && v->weight && v->out && v->emission && v->diffuse && v->unshot ? 0 : -1;
+	return v->emitted && v->part && v->cost && v->link_cost && v->weight && v->out &&
+	       v->emission && v->diffuse && v->unshot ? 0 : -1;
 }
 
 int solver_init(struct solver *v, struct solution *s, const struct transport *t,
