@@ -7,7 +7,6 @@ Each face becomes a node of its own name; rectangles keep their float64 corners 
 unit square under a matrix), other polygons are rounded to float32. An exitance E
 becomes the radiance E/pi. A material whose back has no coefficient and no emission,
 and whose front does not transmit, is one-sided."""
-import copy
 import fnmatch
 import functools
 import json
