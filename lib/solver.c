@@ -57,14 +57,17 @@ static void set_costs(struct solver *v)
 
 	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++) {
 		uint32_t row[2] = { t->diffuse_row[ps], t->emission_row[ps] };
-		v->cost[ps] = row[0] == FF_NO_ROW && row[1] == FF_NO_ROW;
+		v->cost[ps] = 1;
 		for (int k = 0; k < 2; k++)
-			v->cost[ps] = fmax(v->cost[ps], row[k] == FF_NO_ROW ? 0 : row_cost(t, row[k]));
+			if (row[k] != FF_NO_ROW)
+				v->cost[ps] += row_cost(t, row[k]);
 	}
-	for (size_t l = 0; l < t->links; l++)
+	for (size_t l = 0; l < t->links; l++) {
+		v->link_cost[l] = 1;
 		for (size_t way = 0; way < 2; way++)
 			if (t->link_row[2 * l + way] != FF_NO_ROW)
 				v->link_cost[l] += row_cost(t, t->link_row[2 * l + way]);
+	}
 }
 
 static int new_arrays(struct solver *v, struct err *e)
