@@ -9,6 +9,7 @@ becomes the radiance E/pi. A material whose back has no coefficient and no emiss
 and whose front does not transmit, is one-sided."""
 import copy
 import fnmatch
+import functools
 import json
 import math
 import os
@@ -25,8 +26,9 @@ DATA = os.path.join(os.path.dirname(os.path.abspath(__file__)), "data")
 KEYS = ("rho_d", "tau_d", "rho_s", "tau_s")
 
 
+@functools.cache
 def oracles():
-    """All scenes by id."""
+    """All scenes by id; not to be changed."""
     with open(os.path.join(DATA, "global_illumination.json"), encoding="utf-8") as f:
         data = json.load(f)
     known = {o["id"]: o for o in data["oracles"]}

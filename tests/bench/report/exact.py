@@ -71,9 +71,10 @@ def oracles(run):
     yield Title("Exact answers")
     yield Words("""`tests/oracles.py` on the scenes and tables of
         `tests/data/global_illumination.json` and the Cornell box by wavelength, by settings
-        chosen for their tolerances (`best`, its table `BEST`; other methods by its table
-        `CLASSES`). *Of it* is the deviation in parts of the tolerance, and so are two standard
-        errors: from the spread of independent runs, whose mean `best` is where it samples.""")
+        chosen for their tolerances (`best`, table `BEST` of `tests/oracle_settings.py`; other
+        methods by its table `CLASSES`). *Of it* is the deviation in parts of the tolerance, and
+        so are two standard errors: from the spread of independent runs, whose mean `best` is
+        where it samples.""")
     marks = {i: "missed" for i, row in enumerate(rows) if row[-1] == answers.FAILED}
     yield Table("Values", list(answers.HEAD), rows, left=3).marked(marks)
     yield Table("Settings: sizes of patches and elements as parts of the longest edge",
