@@ -13,7 +13,7 @@
  * else of the same input and options, so that what older programs left is made anew. */
 #define REVISION_MESH "7"
 #define REVISION_FF "15"
-#define REVISION_RAD "12"
+#define REVISION_RAD "13"
 #define REVISION_VIEW "8"
 
 /* Strings are owned (malloc) and may be NULL. */
