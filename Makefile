@@ -118,20 +118,22 @@ check-man:
 
 # What the methods make of every exact answer we have.
 oracles: all
-	BUILD=$(abspath $(BUILD)) $(PYTHON) tests/oracles.py --all
+	BUILD=$(abspath $(BUILD)) $(PYTHON) tests/oracles.py --all --jobs $$(nproc)
 
 bench: all $(BENCHES)
 	BUILD=$(abspath $(BUILD)) sh tests/bench/run.sh
 
-# One page of all that is measured, in less than 20 minutes; FULL=1: more, in hours.
+# One page of all that is measured, in less than 20 minutes; FULL=1: more, in hours;
+# README=1: its tables and plot into README.md, too.
 REPORT := BUILD='$(abspath $(BUILD))' CC='$(CC)' OPT='$(OPT)' PYTHON='$(PYTHON)' \
-	$(PYTHON) tests/bench/report $(if $(FULL),--full) --out
+	$(PYTHON) tests/bench/report $(if $(FULL),--full) $(if $(README),--readme README.md) --out
 report: all $(BUILD)/bench/rays
 	@$(REPORT) $(BUILD)/report
+	$(if $(README),cp $(BUILD)/report/speed.png scenes/pictures/speed.png)
 
-# The README's table and plot of speed against error alone.
-report-table: all
-	@$(REPORT) $(BUILD)/report-table --only speed
+# What takes minutes a row and so is not in it.
+report-long: all
+	@$(REPORT) $(BUILD)/report-long --only speed-long
 
 # The README's table of form factors between patches.
 bench-form-factors: all $(BUILD)/bench/rays
@@ -157,7 +159,7 @@ install: all
 clean:
 	rm -rf build build-san out
 
-.PHONY: all unit deps demo check check-layers check-man oracles bench report report-table bench-form-factors \
+.PHONY: all unit deps demo check check-layers check-man oracles bench report report-long bench-form-factors \
 	format install clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

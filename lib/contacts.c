@@ -130,12 +130,27 @@ static int clip(const struct search *s, uint32_t a, double end[2][3], int *rim)
 	return 1;
 }
 
-/* Notes that triangle b meets the plane of triangle a between p and q. */
+/* Does a triangle give light, on either side? */
+static int emits(const struct model *m, uint32_t triangle)
+{
+	const struct materials *mt = &m->material;
+	const double *l = &mt->emission[material_at(mt, m->surface.material[m->triangle_surface[triangle]],
+	                                            FRONT)];
+
+	for (int i = 0; i < 2 * mt->bands; i++)
+		if (l[i] > 0)
+			return 1;
+	return 0;
+}
+
+/* Notes that triangle b meets the plane of triangle a between p and q. The light that a lamp
+ * throws on what is close behind it must not come out beside it. */
 static int add_cut(struct search *s, uint32_t a, uint32_t b, const double p[3],
-                   const double q[3], int flush, double shortest)
+                   const double q[3], int flush, int fine)
 {
 	const double *given[2] = { p, q }, *n = s->normal[a];
-	struct cut c = { .plane = sets_find(s->plane, b), .flush = flush, .shortest = shortest };
+	struct cut c = { .plane = sets_find(s->plane, b), .flush = flush,
+	                 .shortest = fine || emits(s->m, b) ? s->limits->fine : s->limits->shortest };
 	double d[3];
 
 	for (int i = 0; i < 2; i++) {
@@ -162,7 +177,7 @@ static int add_crossing(struct search *s, uint32_t a, uint32_t b, const double h
 			v3_mad(p, height[k] / (height[k] - height[next]), d, end[n++]);
 		}
 	}
-	return n == 2 ? add_cut(s, a, b, end[0], end[1], 0, s->limits->shortest) : 0;
+	return n == 2 ? add_cut(s, a, b, end[0], end[1], 0, 0) : 0;
 }
 
 /* Triangle b stays on one side of the plane of a: what little light comes through between
@@ -178,8 +193,7 @@ static int add_close(struct search *s, uint32_t a, uint32_t b, const double heig
 		if (fabs(height[k]) <= s->limits->close &&
 		    fabs(height[(k + 1) % 3]) <= s->limits->close && coplanar(s, 3 * b + k) == b)
 			status = add_cut(s, a, b, corner(s->m, b, (int)k),
-			                 corner(s->m, b, (int)(k + 1) % 3), close == 3,
-			                 s->limits->shortest);
+			                 corner(s->m, b, (int)(k + 1) % 3), close == 3, 0);
 	return status;
 }
 
@@ -203,7 +217,7 @@ static int add_pair(struct search *s, uint32_t a, uint32_t b)
 		if (height[k] == 0 && height[(k + 1) % 3] == 0 &&
 		    (flat < 3 || coplanar(s, 3 * b + (uint32_t)k) == b))
 			status = add_cut(s, a, b, corner(s->m, b, k), corner(s->m, b, (k + 1) % 3),
-			                 flat == 3, flat == 3 ? s->limits->flush : s->limits->shortest);
+			                 flat == 3, flat == 3);
 	return status;
 }
 

@@ -192,6 +192,21 @@ static double quantile_of_ratios(const struct job *j, size_t begin, size_t end, 
 	return all ? exp2((bin + .5 - BINS / 2) / A_FACTOR_2) : INFINITY;
 }
 
+/* Whether light arrives by patches, whose elements then say nothing of its noise. */
+static int by_patches(const struct job *j)
+{
+	size_t bytes = 2 * PARTS * (size_t)j->s->bands * sizeof *j->h;
+	int shared = 0;
+
+	for (size_t e = 0; e < j->m->elements; e++) {
+		size_t first = j->m->patch_start[j->m->element_patch[e]];
+		if (memcmp((char *)j->h + e * bytes, (char *)j->h + first * bytes, bytes))
+			return 0;
+		shared |= e != first;
+	}
+	return shared;
+}
+
 /* Stated errors take samples for independent. Where most elements differ less from their
  * neighbours than that says, errors are scaled to what they do: those of the parts, and
  * those of all light apart, since what a form factor is off by is in both parts. */
@@ -303,7 +318,8 @@ int discretisation_estimate(const struct model *m, struct solution *s, int threa
 	    !smooth_groups_new(m, cos_crease, &j.g, e)) {
 		take_parts(&j);
 		par_for(m->elements, CHUNK, threads, differences, &j, NULL);
-		correct_noise(&j);
+		if (!by_patches(&j))
+			correct_noise(&j);
 		par_for(m->elements, CHUNK, threads, errors, &j, NULL);
 		bad = 0;
 	}

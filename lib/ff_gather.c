@@ -361,17 +361,24 @@ static double brought(const struct ff_thread *t, uint32_t ps, uint32_t cast)
 struct tale {
 	double sum, variance;
 	double doubt;             /* summed standard errors */
+	double sample;            /* what one sample of the row weighs: its light on elements, per
+	                             area, has the variance of so many independent ones */
 };
 
 static struct tale add_up(const struct ff_thread *t, double sum)
 {
 	const struct ff_sight *s = t->sights.data;
 	struct tale a = { .sum = sum };
+	double light = 0, spread = 0;
 
 	for (size_t i = 0; i < t->sights.n; i++) {
+		double area = t->job->m->element_area[s[i].column >> 1];
 		a.variance += s[i].variance;
 		a.doubt += sqrt(s[i].variance);
+		light += s[i].w / area;
+		spread += s[i].variance / area;
 	}
+	a.sample = light > 0 ? spread / light : 0;
 	return a;
 }
 
@@ -435,10 +442,11 @@ static double landing(const struct ff_thread *t, uint32_t ps, uint32_t cast, dou
 int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_weight *w)
 {
 	const struct ff_job *j = t->job;
-	double sum = ff_row_is_seen(j, ps) ? ff_see(t, ps, ff_row_rays(j, ps), &t->tally.err) : recall(t, ps);
+	int seen = ff_row_is_seen(j, ps);
+	double sum = seen ? ff_see(t, ps, ff_row_rays(j, ps), &t->tally.err) : recall(t, ps);
 	struct tale a = add_up(t, sum);
 	double rays, said = landing(t, ps, cast, &rays), lands = settle(said, rays, &a);
-	double per_sample = a.variance / (ff_row_is_seen(j, ps) ? 1 : worth(j->gather.rays));
+	double per_sample = a.sample / (seen ? 1 : worth(j->gather.rays));
 
 	if (t->tally.err.set || !(lands > 0 && sum > 0) ||
 	    fabs(sum - said) > misfit * said + 3 * sqrt(fmax(sum, said) / rays))

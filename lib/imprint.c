@@ -21,7 +21,7 @@ static struct imprint_limits limits_of(const struct model *m, double size)
 	return (struct imprint_limits){ .size = size * (1 + 1e-8), .thick = thick,
 		                        .close = fmax(size / 8, thick),
 		                        .apart = fmax(1e-3 * size, 2 * thick),
-		                        .shortest = size / 2, .flush = size / 16 };
+		                        .shortest = size / 2, .fine = size / 16 };
 }
 
 int imprint(struct model *m, double size, struct mesher_report *r, struct err *e)

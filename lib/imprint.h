@@ -16,7 +16,7 @@ struct imprint_limits {
 	                     comes between that elements show none of it, m */
 	double apart;     /* points of a cut this close are one, m */
 	double shortest;  /* contacts along shorter pieces of the other triangle are left out, m */
-	double flush;     /* the same of the border of one that lies in the same plane, m */
+	double fine;      /* the same of an emitter, or of the border of one in the same plane, m */
 };
 
 /* A segment in the plane of a triangle, within the triangle. */

@@ -293,5 +293,7 @@ double occluded_exchange(struct occluded *o, struct clear *clear, const struct s
 		shadow_edges(o->seer.blocker, o->blockers, in.f, in.g, in.near, &in.shadows);
 	if (put_whole(&in, all & ~in.shadows.idle, whole))
 		return NAN;
-	return integrate(&in, tolerance, most, error);
+	double seen = integrate(&in, tolerance, most, error);
+	/* Rounding where blockers touch a facet's edges must not carry light through walls. */
+	return seen < 1e-14 * whole ? 0 : seen;
 }

@@ -167,7 +167,7 @@ static void finish(struct sender *s, lanes *cut)
 
 /* ---- landing ---- */
 
-enum { LANDING_MAX = 4 };
+enum { LANDING_MAX = 4, FETCHED = 16, LINE = 64 };
 
 /* Flux landing from a block: N vectors of channels from v on of n, x by unit of the
  * values. The loops over runs are inlined with a constant N. */
@@ -231,17 +231,19 @@ static ALWAYS_INLINE void land_special(const struct landing *l, uint64_t run, si
 	}
 }
 
-/* Links are all over memory: they are on the way while flux lands on plain sides. */
-static void fetch_links(const struct landing *l, uint64_t end)
+/* Links are all over memory: fetches what will be added to by up to FETCHED runs. */
+static void fetch_links(const struct sender *s, const struct block *block, uint64_t run,
+                        uint64_t end, int freshness)
 {
-	enum { MOST = 24 };
-	const uint32_t *link = l->s->t->run_link + l->block->link;
-	const uint64_t all = end - l->block->special, n = all < MOST ? all : MOST;
+	const uint32_t *link = s->t->run_link + block->link + (run - block->special);
+	const uint64_t n = end - run < FETCHED ? end - run : FETCHED;
 
-	for (uint64_t i = 0; i < n; i++)
-		if (link[i] < RUN_FOLLOWED)
-			__builtin_prefetch(l->s->unshot_link + (2 * (size_t)(link[i] & ~RUN_GUESSED) +
-			                   (size_t)l->freshness) * l->n, 1);
+	for (uint64_t i = 0; i < n; i++) {
+		const lanes *to = s->unshot_link + s->vectors *
+		                  (2 * (size_t)(link[i] & ~RUN_GUESSED) + (size_t)freshness);
+		for (size_t v = 0; link[i] < RUN_FOLLOWED && v < s->vectors; v += LINE / sizeof *to)
+			__builtin_prefetch(to + v, 1);
+	}
 }
 
 static ALWAYS_INLINE void land_all(const struct landing *l, uint64_t i, uint64_t end, size_t N,
@@ -263,8 +265,11 @@ static ALWAYS_INLINE void land_all(const struct landing *l, uint64_t i, uint64_t
 	}
 	for (size_t k = 0; k < N; k++)
 		sum[k].absorbed = sum[k].arrived - sum[k].kept;
-	for (; i < end; i++)
+	for (; i < end; i++) {
+		if ((i - l->block->special) % FETCHED == 0 && l->v == 0 && i + FETCHED < l->block[1].run)
+			fetch_links(l->s, l->block, i + FETCHED, l->block[1].run, l->freshness);
 		land_special(l, i, N, n, sum);
+	}
 	for (size_t k = 0; k < N; k++) {
 		sent->kept[l->v + k] += sum[k].kept;
 		sent->absorbed[l->v + k] += sum[k].absorbed;
@@ -311,7 +316,7 @@ static void send_block(struct sender *s, const struct block *block, int freshnes
 		exact_land(s, block, freshness, in, sent);
 		return;
 	}
-	fetch_links(&l, end);
+	fetch_links(s, block, block->special, end, freshness);
 	for (uint64_t i = block->run; i < end; i += tile)
 		for (l.v = 0; l.v < l.n; l.v += LANDING_MAX) {
 			size_t N = l.n - l.v < LANDING_MAX ? l.n - l.v : LANDING_MAX;
@@ -361,21 +366,27 @@ static void go_round(struct sender *s, const struct block *block, double *in, la
 		book(s, cut, v, ever[v]);
 }
 
-void send_fetch(const struct transport *t, uint32_t row, int runs)
+void send_fetch(const struct sender *s, uint32_t row, int freshness, int ahead)
 {
-	enum { LINE = 64, MOST = 64 };
+	enum { MOST = 64 };
+	const struct transport *t = s->t;
 	const struct block *block = &t->block[t->row_block[row]];
 
-	if (!runs) {
+	if (ahead > 2) {
 		__builtin_prefetch(block);
 		__builtin_prefetch(block + 1);
 		return;
 	}
 	const uint64_t first = block->run, n = block[1].run - first;
+	if (ahead == 1) {
+		fetch_links(s, block, block->special, first + n, freshness);
+		return;
+	}
 	for (uint64_t i = first; i < first + (n < MOST ? n : MOST); i += LINE / sizeof *t->run_sum) {
 		__builtin_prefetch(t->run_target + i);
 		__builtin_prefetch(t->run_sum + i);
 	}
+	__builtin_prefetch(t->run_link + block->link);
 }
 
 void send_row(struct sender *s, uint32_t row, int freshness, const lanes *flux,

@@ -67,8 +67,9 @@ static inline const lanes *sender_share(const struct sender *s, uint32_t ps)
 void send_row(struct sender *s, uint32_t row, int freshness, const lanes *flux,
               struct sent *sent);
 
-/* Fetches the runs of a row that is sent soon, or only what says where they are. */
-void send_fetch(const struct transport *t, uint32_t row, int runs);
+/* Fetches a row that is sent soon: what says where it is (ahead 3), its runs (2), and what
+ * they add to (1), each by what the one before fetched. */
+void send_fetch(const struct sender *s, uint32_t row, int freshness, int ahead);
 
 /* The flux that comes in by each block of a row, [blocks of the row][channels],
  * when the row sends flux[channels]. */

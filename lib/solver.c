@@ -57,14 +57,17 @@ static void set_costs(struct solver *v)
 
 	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++) {
 		uint32_t row[2] = { t->diffuse_row[ps], t->emission_row[ps] };
-		v->cost[ps] = row[0] == FF_NO_ROW && row[1] == FF_NO_ROW;
+		v->cost[ps] = 1;
 		for (int k = 0; k < 2; k++)
-			v->cost[ps] = fmax(v->cost[ps], row[k] == FF_NO_ROW ? 0 : row_cost(t, row[k]));
+			if (row[k] != FF_NO_ROW)
+				v->cost[ps] += row_cost(t, row[k]);
 	}
-	for (size_t l = 0; l < t->links; l++)
+	for (size_t l = 0; l < t->links; l++) {
+		v->link_cost[l] = 1;
 		for (size_t way = 0; way < 2; way++)
 			if (t->link_row[2 * l + way] != FF_NO_ROW)
 				v->link_cost[l] += row_cost(t, t->link_row[2 * l + way]);
+	}
 }
 
 static int new_arrays(struct solver *v, struct err *e)
@@ -80,7 +83,8 @@ static int new_arrays(struct solver *v, struct err *e)
 	v->diffuse = lanes_new(vectors, &v->room[3], "flux", e);
 	v->unshot = lanes_new(vectors, &v->room[4], "flux", e);
 	v->part = lanes_new(parts * vectors, &v->room[5], "priorities", e);
-	return v->emitted && v->part && v->cost && v->link_cost && v->weight && v->out && v->emission && v->diffuse && v->unshot ? 0 : -1;
+	return v->emitted && v->part && v->cost && v->link_cost && v->weight && v->out &&
+	       v->emission && v->diffuse && v->unshot ? 0 : -1;
 }
 
 int solver_init(struct solver *v, struct solution *s, const struct transport *t,
@@ -338,35 +342,39 @@ static void take(lanes *from, lanes *to, lanes *out, size_t vectors)
 	}
 }
 
-/* Fetches what sending a link reads; its heads alone, or its runs by them. */
-static void fetch_link(const struct solver *v, uint32_t ps, uint64_t l, int runs)
+/* Fetches what sending a link reads and writes. */
+static void fetch_link(const struct solver *v, uint32_t ps, uint64_t l, int ahead)
 {
 	const uint32_t *row = v->t->link_row + (l & ~(uint64_t)1);
 
 	for (int way = 0; l < 2 * v->t->target_link[ps + 1] && way < 2; way++)
 		if (row[way] != FF_NO_ROW)
-			send_fetch(v->t, row[way], runs);
+			send_fetch(&v->sender, row[way], (int)(l & 1), ahead);
 }
 
-/* Links are short, so that reading them is waiting for memory: each is looked for two
+/* Links are short, so that reading them is waiting for memory: each is looked for three
  * ahead. Whether there were any. */
 static int shoot_links(struct solver *v, uint32_t ps, double least)
 {
+	enum { AHEAD = 3 };
 	const struct transport *t = v->t;
+	const uint64_t end = 2 * t->target_link[ps + 1];
 	size_t vectors = v->sender.vectors;
 	lanes now[VECTORS_MAX];
-	const uint64_t first = 2 * t->target_link[ps], end = 2 * t->target_link[ps + 1];
-	uint64_t l = next_link(v, ps, first, least), later, next = l;
+	uint64_t l[AHEAD + 1] = { next_link(v, ps, 2 * t->target_link[ps], least) };
 
-	if (l == end)
+	if (l[0] == end)
 		return 0;
-	for (next = next_link(v, ps, l + 1, least); l < end; l = next, next = later) {
-		lanes *u = v->sender.unshot_link + l * vectors;
-		later = next_link(v, ps, next + 1, least);
-		fetch_link(v, ps, later, 0);
-		fetch_link(v, ps, next, 1);
-		take(u, now, v->out, vectors);
-		solver_send_link(v, l, now, v->s->shot);
+	for (int k = 0; k < AHEAD; k++)
+		l[k + 1] = l[k] < end ? next_link(v, ps, l[k] + 1, least) : end;
+	while (l[0] < end) {
+		for (int k = AHEAD; k > 0; k--)
+			fetch_link(v, ps, l[k], k);
+		take(v->sender.unshot_link + l[0] * vectors, now, v->out, vectors);
+		solver_send_link(v, l[0], now, v->s->shot);
+		memmove(l, l + 1, AHEAD * sizeof *l);
+		if (l[AHEAD] < end)
+			l[AHEAD] = next_link(v, ps, l[AHEAD] + 1, least);
 	}
 	return 1;
 }

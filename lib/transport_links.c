@@ -64,8 +64,11 @@ static uint32_t nearest_link(const struct transport *t, const struct link_key *l
 
 /* The link for light of a source and chain, or the nearest. */
 uint32_t transport_find_link(const struct transport *t, const struct link_key *l,
-                             const struct block *block, uint32_t target, uint32_t source)
+                             const struct block *block, uint32_t target, uint32_t source,
+                             struct known_link *known)
 {
+	if (known->link && known->source == source && known->chain == block->chain)
+		return known->link - 1;
 	size_t lo = t->target_link[target], hi = t->target_link[target + 1];
 	uint32_t chain = block->chain;
 	struct link_key want = { .target = target, .source = source, .chain = chain,
@@ -80,7 +83,9 @@ uint32_t transport_find_link(const struct transport *t, const struct link_key *l
 			hi = mid;
 	}
 	if (hi > lo && l[hi - 1].chain == chain && l[hi - 1].source <= source &&
-	    l[hi - 1].last >= source)
+	    l[hi - 1].last >= source) {
+		*known = (struct known_link){ source, chain, (uint32_t)hi };
 		return (uint32_t)(hi - 1);
+	}
 	return nearest_link(t, l, block, target);
 }

@@ -135,11 +135,12 @@ static void follow_sample(struct run *r, uint32_t i, struct part *to)
 	double cos_i = v3_dot(l->normal, next->dir);
 	if (!(cos_i > 0))
 		return;
-	next->density = density(l, kind, next->dir);
-	if (to)
-		follow(r, per_density(l, kind, cos_i), to);
-	else
+	if (!to) {
 		view_push(w, r->b, next, r->coefficient, per_density(l, kind, cos_i));
+		return;
+	}
+	next->density = density(l, kind, next->dir);
+	follow(r, per_density(l, kind, cos_i), to);
 }
 
 static void follow_both(struct run *r, uint32_t i, struct part *to)

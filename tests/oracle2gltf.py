@@ -9,6 +9,7 @@ becomes the radiance E/pi. A material whose back has no coefficient and no emiss
 and whose front does not transmit, is one-sided."""
 import copy
 import fnmatch
+import functools
 import json
 import math
 import os
@@ -19,22 +20,20 @@ import numpy as np
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "scenes"))
 from gltf_writer import Scene, Shape
+from oracle_tables import scenes_of_tables
 
 DATA = os.path.join(os.path.dirname(os.path.abspath(__file__)), "data")
 KEYS = ("rho_d", "tau_d", "rho_s", "tau_s")
 
 
+@functools.cache
 def oracles():
-    """All scenes by id."""
+    """All scenes by id; not to be changed."""
     with open(os.path.join(DATA, "global_illumination.json"), encoding="utf-8") as f:
         data = json.load(f)
     known = {o["id"]: o for o in data["oracles"]}
     known["khodulev_cube"] = khodulev(known["khodulev_cube"])
-    analytic = {a["id"]: a for a in data["analytic"]}
-    point = analytic["cie171_5.2_diffuse_point"]
-    known[point["id"]] = small_lamp(point)
-    for o in [*becoming_mirror(analytic["phong_to_mirror_series"], known["phong_to_mirror_n10"]),
-              *swapped(analytic["reciprocity_swap"])]:
+    for o in scenes_of_tables({a["id"]: a for a in data["analytic"]}, known["phong_to_mirror_n10"]):
         known.setdefault(o["id"], o)
     with open(os.path.join(DATA, "cornell_box.json"), encoding="utf-8") as f:
         box = json.load(f)
@@ -115,55 +114,6 @@ def graded(oracle, cuts):
                   for u, x in spans for v, y in spans]
     expect = [{**e, "face": e["face"] + "*"} for e in oracle["expect"]]
     return {**oracle, "faces": faces, "expect": expect}
-
-
-def sampled(value, error, **expect):
-    """A mean irradiance that particles found: four of their standard errors are allowed."""
-    return {"quantity": "H", "side": "front", "stat": "mean", "value": value,
-            "rel_tol_hemicube": .02, "rel_tol": max(.002, 4 * error / value), **expect}
-
-
-def becoming_mirror(series, scene):
-    """The scene of a lobe's exponent and of both kinds of lobes."""
-    for kind, name, values in (("seed", "phong", series["values"]["seed"]),
-                               ("reciprocal", "reciprocal", series["values"]["max"])):
-        for n, v in values.items():
-            materials = copy.deepcopy(scene["materials"])
-            for m in materials.values():
-                if m["front"].get("rho_s"):
-                    m["front"]["n"] = float(n)
-            yield {**scene, "id": f"{name}_to_mirror_n{n}", "lobe": kind, "materials": materials,
-                   "expect": [sampled(v["H"], v["se"], face="receiver")]}
-
-
-def swapped(oracle):
-    """Light of A and of B by way of a lobe of exponent 1, of both kinds, to the other."""
-    faces = [("lobe", [(-.5, -.5, 0), (.5, -.5, 0), (.5, .5, 0), (-.5, .5, 0)]),
-             ("A", [(-.5, .5, 2), (.5, .5, 2), (.5, -.5, 2), (-.5, -.5, 2)]),
-             ("B", [(2, -.5, .1), (2, -.5, .6), (2, .5, .6), (2, .5, .1)])]
-    area = {"A": 1, "B": .5}
-    for kind, values in oracle["values"].items():
-        for emitter, receiver in ("AB", "BA"):
-            materials = {"lobe": {"front": {"rho_s": 1, "n": 1}, "back": {}},
-                         receiver: {"front": {}, "back": {}}, emitter: {"front": {"E": 1}, "back": {}}}
-            flux, error = (x / area[receiver] for x in values[f"flux_{emitter}_to_{receiver}"])
-            yield {"id": f"swap_{kind}_{emitter}_to_{receiver}", "group": "specular",
-                   "materials": materials, "lobe": "seed" if kind.startswith("seed") else "reciprocal",
-                   "faces": [{"name": n, "mat": n, "verts": v} for n, v in faces],
-                   "expect": [sampled(flux, error, face=receiver)]}
-
-
-def small_lamp(oracle):
-    """CIE 171, 5.2: a source of 1000 cd straight down as a patch of 1 cm2, 3 m above a floor."""
-    materials = {"floor": {"front": {}, "back": {}},
-                 "lamp": {"front": {"E": math.pi * 1e7}, "back": {}}}
-    patch = lambda r, z: [(-r, -r, z), (r, -r, z), (r, r, z), (-r, r, z)]
-    faces = [{"name": "floor", "mat": "floor", "verts": patch(2, 0)},
-             {"name": "lamp", "mat": "lamp", "verts": patch(.005, 3)[::-1]}]
-    expect = [{"quantity": "H", "stat": "point", "face": "floor", "side": "front", "label": label,
-               "point": [x, y, 0], "value": h, "rel_tol": oracle["rel_tol"],
-               "rel_tol_hemicube": .01} for label, (x, y, h) in oracle["points"].items()]
-    return {**oracle, "materials": materials, "faces": faces, "expect": expect}
 
 
 def coefficients(side):

@@ -37,6 +37,7 @@ from cube_factors import cube_factors
 from ff_scenes import make
 
 SCENES = ["cube16", "cube24", "room", "room-turned", "city100", "city370", "city2100"]
+LARGE = "cube58"  # one run in minutes
 RUNS = ["-m analytic --to patches", "-m analytic --to patches -t 1e-6", "-m auto --to patches",
         "-m rays -n 4096", "-m rays -n 65536", "-m hemicube -n 64 -p 16"]
 TUNED = {"room": "2e-8", "room-turned": "2e-8", "city100": "2e-5", "city370": "8e-6",
@@ -192,7 +193,7 @@ def main():
     line(HEAD)
     line(["---"] * 3 + ["---:"] * 9 + ["---"])
     work = os.path.join(BUILD, "form-factors")
-    for name in a.scene or SCENES:
+    for name in a.scene or SCENES + [LARGE] * a.tuned:
         if not make(name):
             p.error(f"no scene {name}")
         scene = Scene(name, work, a.fresh, a.rays)

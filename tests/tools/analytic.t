@@ -146,4 +146,26 @@ rm -f "$T/b.ff"
 ffcalc $patches "$T/a.mesh" -o "$T/b.ff" >"$T/said" 2>&1
 check "says nothing where all is done by formula" sh -c "! grep -q '^by rays' '$T/said'"
 
+# A lit box in a dark one, turned so that nothing is exact: not even rounding gets out.
+$PYTHON - "$T/boxes.gltf" "$scenes" <<'END'
+import sys
+sys.path.insert(0, sys.argv[2])
+from gltf_writer import Scene, Shape
+
+s = Scene("boxes")
+lit = s.material("lit", {"rho_d": .5, "emission_front": 1}, double_sided=True)
+dark = s.material("dark", {"rho_d": .5})
+for name, low, high, material in ("outer", 0, 1, dark), ("inner", .25, .75, lit):
+    box = Shape().box((low,) * 3, (high,) * 3)
+    box.triangles = [t[::-1] for t in box.triangles]
+    turn = [.36, .48, -.8, 0, -.8, .6, 0, 0, .48, .64, .6, 0, 0, 0, 0, 1]
+    s.node(name, mesh=s.mesh(name, box, material), matrix=turn)
+s.write(sys.argv[1])
+END
+prepare mesh "$T/boxes.gltf" -o "$T/boxes.mesh" -p .5 -e .5
+prepare ffcalc $patches "$T/boxes.mesh" -o "$T/boxes.ff"
+prepare shoot "$T/boxes.mesh" "$T/boxes.ff" -o "$T/boxes.rad"
+check "exactly dark outside" sh -c "inspect --csv '$T/boxes.rad' |
+	awk -F, '\$4 == \"outer\" { n++; bad += \$13 != 0 } END { exit !(n && !bad) }'"
+
 done_testing

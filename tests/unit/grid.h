@@ -91,7 +91,7 @@ static inline void grid_end(struct model *m)
 	assert_int_equal(model_derive(m, &e), 0);
 }
 
-/* A solution with `h` as indirect irradiance everywhere. */
+/* A solution with `h` as indirect irradiance everywhere, without errors. */
 static inline void grid_solution(const struct model *m, double h, struct solution *s)
 {
 	size_t n = 2 * m->elements * (size_t)m->bands;
@@ -103,6 +103,8 @@ static inline void grid_solution(const struct model *m, double h, struct solutio
 	s->indirect = calloc(n, sizeof *s->indirect);
 	s->error = calloc(n, sizeof *s->error);
 	s->error_direct = calloc(n, sizeof *s->error_direct);
+	s->discretisation = calloc(n, sizeof *s->discretisation);
+	s->discretisation_direct = calloc(n, sizeof *s->discretisation_direct);
 	for (size_t i = 0; i < n; i++)
 		s->indirect[i] = h;
 }

@@ -412,6 +412,26 @@ static void test_reciprocity_ratio_table(void **state)
 	materials_free(&m.material);
 }
 
+/* The paper's lobe of exponent 1 for light along the normal is diffuse, to rounding. */
+static void test_exponent_one_is_diffuse(void **state)
+{
+	struct rng r = rng_seed(5, 0);
+	struct model m;
+
+	(void)state;
+	begin(&m, 1, LOBE_PAPER);
+	m.material.rho_s[FRONT] = .6;
+	m.material.alpha[FRONT] = 1;
+	for (int i = 0; i < 1000; i++) {
+		double from[3], to[3], f;
+		direction(0, 0, from);
+		direction(pi / 2 * rng_uniform(&r), 2 * pi * rng_uniform(&r), to);
+		bsdf_eval(&m, 0, n, from, to, &f);
+		assert_true(fabs(f * pi / .6 - 1) < 1e-12);
+	}
+	materials_free(&m.material);
+}
+
 static void test_reciprocal_lobe(void **state)
 {
 	struct rng r = rng_seed(3, 0);
@@ -626,6 +646,7 @@ int main(void)
 		cmocka_unit_test(test_chi_square_of_lobes),
 		cmocka_unit_test(test_mixed_materials),
 		cmocka_unit_test(test_reciprocity_ratio_table),
+		cmocka_unit_test(test_exponent_one_is_diffuse),
 		cmocka_unit_test(test_reciprocal_lobe),
 		cmocka_unit_test(test_reciprocal_albedo),
 		cmocka_unit_test(test_flipped_winding),

@@ -190,6 +190,13 @@ static void test_stated_noise(void **state)
 	within_factor(run_noisy(step, .05, .15), 1.6);
 }
 
+/* Elements that share their patch's irradiance do not make its error any smaller. */
+static void test_noise_by_patches(void **state)
+{
+	(void)state;
+	assert_true(run_noisy(constant, 0, .1).noise == .1);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -198,6 +205,7 @@ int main(void)
 		cmocka_unit_test(test_shadow_edge),
 		cmocka_unit_test(test_noise),
 		cmocka_unit_test(test_stated_noise),
+		cmocka_unit_test(test_noise_by_patches),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -62,7 +62,7 @@ static void check_no_contacts(const struct model *m, double size)
 {
 	struct imprint_limits limits = { .size = 0, .thick = 1e-6 * size,
 		                         .close = 1e-6 * size, .apart = .05 * size,
-		                         .shortest = .55 * size };
+		                         .shortest = .55 * size, .fine = .55 * size };
 	struct contacts found = { 0 };
 	struct edges g;
 	struct err e = { 0 };

@@ -5,25 +5,10 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include "grid.h"
 #include "shapes.h"
 
 static const struct mesher_refinement how = { .01, { .02, 0 }, 100000 };
-
-/* An even solution without errors. */
-static struct solution lit(const struct model *m)
-{
-	size_t n = 2 * m->elements * (size_t)m->bands;
-	struct solution s = { .groups = 1, .element_sides = 2 * m->elements, .bands = m->bands,
-		.direct = calloc(n, sizeof(double)), .caustic = calloc(n, sizeof(double)),
-		.indirect = calloc(n, sizeof(double)), .error = calloc(n, sizeof(double)),
-		.error_direct = calloc(n, sizeof(double)),
-		.discretisation = calloc(n, sizeof(double)),
-		.discretisation_direct = calloc(n, sizeof(double)) };
-
-	for (size_t i = 0; i < n; i++)
-		s.direct[i] = 1;
-	return s;
-}
 
 static void centroid(const struct model *m, size_t e, double c[3])
 {
@@ -57,43 +42,69 @@ static double longest(const struct model *m, size_t e)
 }
 
 struct refined {
-	struct model old, m;
-	struct solution s;
+	struct model base, old, m; /* base is used up by refining, old is the same again */
+	struct solution s;         /* of these: light 1 everywhere, without errors at first */
 	struct mesher_report r;
 	uint32_t *origin;
+	struct err e;
 };
 
-/* The mesh of a scene, refined once; old is made again, since refining uses it up. */
+static void mesh(struct model *m, void (*make)(struct model *), struct mesher_options o)
+{
+	make(m);
+	struct mesher_report r = run(m, o);
+	mesher_report_free(&r);
+}
+
+static void prepare(struct refined *f, void (*make)(struct model *), struct mesher_options o)
+{
+	*f = (struct refined){ 0 };
+	mesh(&f->base, make, o);
+	mesh(&f->old, make, o);
+	make(&f->m);
+	grid_solution(&f->old, 0, &f->s);
+	for (size_t i = 0; i < f->s.element_sides; i++)
+		f->s.direct[i] = 1;
+}
+
+/* Light that differs along some of the axes. */
+static void make_uneven(struct refined *f, double by, int first_axis)
+{
+	for (size_t i = 0; i < f->old.elements; i++) {
+		double c[3];
+		centroid(&f->old, i, c);
+		for (int k = first_axis; k < 3; k++)
+			f->s.direct[2 * i] += by * sin(8 * acos(-1) * c[k]);
+	}
+}
+
+static int refine_once(struct refined *f, const struct mesher_options *o,
+                       const struct mesher_refinement *to)
+{
+	return mesher_refine(&f->m, o, &f->base, &f->s, to, &f->origin, &f->r, &f->e);
+}
+
+/* The mesh of a scene, refined near a point. */
 static void refine(struct refined *f, void (*make)(struct model *), double size,
                    const double at[3], double reach)
 {
-	struct model base;
-	struct err e = { 0 };
-
-	*f = (struct refined){ 0 };
-	make(&base);
-	f->r = run(&base, sizes(size, size / 2, 0));
-	f->s = lit(&base);
-	doubt(&base, &f->s, at, reach);
-	mesher_report_free(&f->r);
-	make(&f->old);
-	struct mesher_report r = run(&f->old, sizes(size, size / 2, 0));
-	mesher_report_free(&r);
-	make(&f->m);
 	struct mesher_options o = sizes(size, size / 2, 0);
-	assert_int_equal(mesher_refine(&f->m, &o, &base, &f->s, &how, &f->origin, &f->r, &e), 0);
-	assert_int_equal(model_check(&f->m, &e), 0);
+
+	prepare(f, make, o);
+	doubt(&f->old, &f->s, at, reach);
+	assert_int_equal(refine_once(f, &o, &how), 0);
+	assert_int_equal(model_check(&f->m, &f->e), 0);
 	check_locations(&f->m);
 	check_conforming(&f->m);
 	check_patches(&f->m, o.normal_cone);
 	check_outlines(&f->m, 1e-10);
-	model_free(&base);
 }
 
 static void release(struct refined *f)
 {
-	solution_free(&f->s);
+	grid_solution_free(&f->s);
 	mesher_report_free(&f->r);
+	model_free(&f->base);
 	model_free(&f->old);
 	model_free(&f->m);
 	free(f->origin);
@@ -180,86 +191,60 @@ static void test_out_of_reach(void **state)
 	const double at[3] = { .3, .4, 1 };
 	const struct mesher_refinement one = { how.error, { .08, 0 }, how.elements };
 	const struct mesher_options o = sizes(.25, .125, 0);
-	struct model base, m;
-	struct mesher_report r;
-	struct err e = { 0 };
-	uint32_t *origin;
+	struct refined f;
 	size_t near = 0;
 
 	(void)state;
-	make_cube(&base);
-	r = run(&base, o);
-	mesher_report_free(&r);
-	make_cube(&m);
-	struct solution s = lit(&base);
-	for (size_t i = 0; i < s.element_sides; i++)
-		s.discretisation[i] = s.discretisation_direct[i] = 1e-4;
-	doubt(&base, &s, at, .1);
-	for (size_t i = 0; i < s.element_sides; i++)
-		near += s.discretisation[i] > .1;
-	assert_int_equal(mesher_refine(&m, &o, &base, &s, &one, &origin, &r, &e), 0);
-	assert_int_equal(r.marked, near);
-	assert_true(r.error_expected > one.error);
-	mesher_report_free(&r);
-	free(origin);
-	solution_free(&s);
-	model_free(&base);
-	model_free(&m);
+	prepare(&f, make_cube, o);
+	for (size_t i = 0; i < f.s.element_sides; i++)
+		f.s.discretisation[i] = f.s.discretisation_direct[i] = 1e-4;
+	doubt(&f.old, &f.s, at, .1);
+	for (size_t i = 0; i < f.s.element_sides; i++)
+		near += f.s.discretisation[i] > .1;
+	assert_int_equal(refine_once(&f, &o, &one), 0);
+	assert_int_equal(f.r.marked, near);
+	assert_true(f.r.error_expected > one.error);
+	release(&f);
 }
 
 /* A patch next to another wall whose light differs from end to end is halved, though its
  * elements are right; one in the middle of a wall is not. */
 static void test_patches(void **state)
 {
-	struct model old, again;
-	struct mesher_report r;
 	struct mesher_options o = sizes(.25, .1, 0);
-	struct err e = { 0 };
-	uint32_t *origin;
+	struct refined f;
 
 	(void)state;
-	make_room(&old);
-	r = run(&old, o);
-	mesher_report_free(&r);
-	struct solution s = lit(&old);
-	for (size_t i = 0; i < old.elements; i++) {
-		double c[3];
-		centroid(&old, i, c);
-		for (int k = 0; k < 3; k++)
-			s.direct[2 * i] += .4 * sin(8 * acos(-1) * c[k]);
-	}
-	make_room(&again);
-	size_t before = old.patches;
-	assert_int_equal(mesher_refine(&again, &o, &old, &s, &how, &origin, &r, &e), 0);
-	assert_true(r.patches_marked > 0 && r.marked == 0 && again.patches > before);
-	for (uint32_t p = 0; p < again.patches; p++) {
+	prepare(&f, make_room, o);
+	make_uneven(&f, .4, 0);
+	assert_int_equal(refine_once(&f, &o, &how), 0);
+	assert_true(f.r.patches_marked > 0 && f.r.marked == 0 && f.m.patches > f.old.patches);
+	for (uint32_t p = 0; p < f.m.patches; p++) {
 		int border = 0;
-		for (size_t i = 3 * (size_t)again.patch_start[p];
-		     i < 3 * (size_t)again.patch_start[p + 1]; i++)
+		for (size_t i = 3 * (size_t)f.m.patch_start[p];
+		     i < 3 * (size_t)f.m.patch_start[p + 1]; i++)
 			for (size_t k = 0; k < 3; k++) {
-				double x = again.vertex[3 * (size_t)again.element[i] + k];
-				const double *n = &again.element_normal[3 * (i / 3)];
+				double x = f.m.vertex[3 * (size_t)f.m.element[i] + k];
+				const double *n = &f.m.element_normal[3 * (i / 3)];
 				border |= fabs(n[k]) < .5 && (x < .26 || x > .74);
 			}
-		assert_true(border || again.patch_area[p] > .9 / 16);
+		assert_true(border || f.m.patch_area[p] > .9 / 16);
 	}
-	solution_free(&s);
-	mesher_report_free(&r);
-	model_free(&old);
-	model_free(&again);
-	free(origin);
+	release(&f);
 }
 
-/* A wall, and a shiny plate of this exponent that faces it at a distance. */
-static void make_plate(struct model *m, double distance, double exponent)
+/* A wall, and a shiny plate of an exponent that faces it at a distance. */
+static double plate_distance, plate_exponent;
+
+static void make_plate(struct model *m)
 {
 	begin(m, 2, 1);
 	add_rectangle(m, (double[]){ 0, 0, 0 }, (double[]){ 0, 1, 0 }, (double[]){ 0, 0, 1 }, 0);
-	add_rectangle(m, (double[]){ distance, 0, 0 }, (double[]){ 0, 0, 1 },
+	add_rectangle(m, (double[]){ plate_distance, 0, 0 }, (double[]){ 0, 0, 1 },
 	              (double[]){ 0, 1, 0 }, 1);
 	m->material.rho_d[2] = 0;
 	m->material.rho_s[2] = .9;
-	m->material.alpha[2] = exponent;
+	m->material.alpha[2] = plate_exponent;
 }
 
 /* Patches of a surface. */
@@ -275,33 +260,19 @@ static size_t count(const struct model *m, uint32_t surface)
 /* Patches of the wall that are halved for the plate, where its light is uneven by so much. */
 static size_t halved_for(double distance, double exponent, double uneven)
 {
-	struct model old, m;
-	struct mesher_report r;
 	struct mesher_options o = sizes(.25, .1, 0);
-	struct err e = { 0 };
-	uint32_t *origin;
+	struct refined f;
 
-	make_plate(&old, distance, exponent);
-	r = run(&old, o);
-	mesher_report_free(&r);
-	struct solution s = lit(&old);
-	for (size_t i = 0; i < old.elements; i++) {
-		double c[3];
-		centroid(&old, i, c);
-		s.direct[2 * i] += uneven * sin(8 * acos(-1) * c[2]);
-	}
-	size_t wall = count(&old, 0), plate = count(&old, 1);
-	make_plate(&m, distance, exponent);
-	assert_int_equal(mesher_refine(&m, &o, &old, &s, &how, &origin, &r, &e), 0);
-	size_t halved = r.patches_for_lobes;
-	assert_int_equal(r.patches_marked, halved);
-	assert_int_equal(count(&m, 1), plate);
-	assert_int_equal(count(&m, 0) > wall, halved > 0);
-	solution_free(&s);
-	mesher_report_free(&r);
-	model_free(&old);
-	model_free(&m);
-	free(origin);
+	plate_distance = distance;
+	plate_exponent = exponent;
+	prepare(&f, make_plate, o);
+	make_uneven(&f, uneven, 2);
+	assert_int_equal(refine_once(&f, &o, &how), 0);
+	size_t halved = f.r.patches_for_lobes;
+	assert_int_equal(f.r.patches_marked, halved);
+	assert_int_equal(count(&f.m, 1), count(&f.old, 1));
+	assert_int_equal(count(&f.m, 0) > count(&f.old, 0), halved > 0);
+	release(&f);
 	return halved;
 }
 
@@ -319,26 +290,15 @@ static void test_lobes(void **state)
 
 static void test_changed(void **state)
 {
-	struct model old, m;
-	struct mesher_report r;
 	struct mesher_options o = sizes(.25, .1, 0);
-	struct err e = { 0 };
-	uint32_t *origin;
+	struct refined f;
 
 	(void)state;
-	make_cube(&old);
-	r = run(&old, o);
-	mesher_report_free(&r);
-	struct solution s = lit(&old);
-	make_cube(&m);
-	m.vertex[0] -= 1e-3;
-	assert_int_equal(mesher_refine(&m, &o, &old, &s, &how, &origin, &r, &e), -1);
-	assert_non_null(strstr(e.text, "has changed"));
-	solution_free(&s);
-	mesher_report_free(&r);
-	model_free(&old);
-	model_free(&m);
-	free(origin);
+	prepare(&f, make_cube, o);
+	f.m.vertex[0] -= 1e-3;
+	assert_int_equal(refine_once(&f, &o, &how), -1);
+	assert_non_null(strstr(f.e.text, "has changed"));
+	release(&f);
 }
 
 int main(void)

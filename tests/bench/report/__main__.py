@@ -3,11 +3,13 @@
 
 report [--out DIR] [--full] [--quick] [--only SECTION]...
 
-Everything is measured anew, in less than 20 minutes on two idle processors; --full adds
-what takes longer, --quick takes so few samples that errors mean nothing (to try the
-programs). With --work DIR yardsticks are kept there for the next run; remove DIR when
-scenes or `reference` changed. BUILD says where the programs are (default build)."""
+Everything is measured anew, in less than 20 minutes on two idle processors; the last
+table says where they went. --full adds what takes longer, --quick takes so few samples
+that errors mean nothing (to try the programs). With --work DIR yardsticks are kept there
+for the next run; remove DIR when scenes or `reference` changed. BUILD says where the
+programs are (default build)."""
 import argparse
+import concurrent.futures
 import os
 import resource
 import shutil
@@ -29,30 +31,80 @@ import speed
 import stated
 import views
 from chain import Failed
-from measure import load, machine
+from jobs import workers
+from measure import job, load, machine, ran
 from page import Bar, Title, Words
 from plan import FULL, PLAN, QUICK
 from yardstick import Scene
 
-SECTIONS = {"rates": rates.section, "views": views.section, "speed": speed.section,
-            "stated": stated.section, "exact": exact.oracles, "hard-cases": exact.hard_cases,
-            "form-factors": exact.form_factors, "lobes": directional.schemes,
-            "exponents": directional.exponent,            "growth": growth.section}
-MINUTES = 20
+SECTIONS = {  # what is submitted first of all, and what is timed and written then
+    "rates": (rates.submit, rates.section), "views": (views.submit, views.section),
+    "speed": (speed.submit, speed.section), "stated": (None, stated.section),
+    "exact": (exact.submit_oracles, exact.oracles),
+    "hard-cases": (exact.submit_hard_cases, exact.hard_cases),
+    "form-factors": (None, exact.form_factors),
+    "lobes": (directional.submit_schemes, directional.schemes),
+    "exponents": (directional.submit_exponents, directional.exponent),
+    "growth": (None, growth.section)}
+APART = {"speed-long": (speed.submit_long, speed.long_section)}  # only if asked for
+MINUTES, YARDSTICKS = 20, "yardsticks of "
+
+
+class Spent:
+    """Elapsed and processor seconds since it was made."""
+
+    def __init__(self):
+        self.begun = self.now()
+
+    @staticmethod
+    def now():
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return time.monotonic(), used.ru_utime + used.ru_stime
+
+    def seconds(self):
+        return [now - begun for now, begun in zip(self.now(), self.begun)]
 
 
 class Run:
-    """What the sections share: the plan, scenes with their yardsticks, what was found."""
+    """What the sections share: the plan, scenes with their yardsticks, what was found.
+
+    First all that is not timed is done, one job a processor at a time; then the sections
+    have the machine to themselves."""
 
     def __init__(self, plan, out, work):
         self.plan, self.out, self.work = plan, out, work
-        self.scenes, self.rows, self.views, self.bars = {}, [], [], []
-        self.begun = time.monotonic()
+        self.scenes, self.rows, self.views, self.bars, self.readme = {}, [], [], [], {}
+        self.jobs, self.times, self.spent = {}, [], Spent()
+        self.pool = workers()
+
+    def submit(self, kind, calls):
+        """Of calls {key: (function, arguments…)}; collected() has what they return."""
+        self.jobs[kind] = {key: self.pool.submit(job, *call) for key, call in calls.items()}
+
+    def finish_jobs(self):
+        jobs = [j for kind in self.jobs.values() for j in kind.values()]
+        for i, _ in enumerate(concurrent.futures.as_completed(jobs), 1):
+            if i % 10 == 0 or i == len(jobs):
+                self.tell(f"{i} of {len(jobs)} jobs that are not timed")
+        self.pool.shutdown()
+        elapsed, _ = self.spent.seconds()
+        for name in self.scenes:
+            self.collected(YARDSTICKS + name)  # nothing goes without
+        for kind, calls in self.jobs.items():
+            took = sum(j.result()[1] for j in calls.values() if not j.exception())
+            self.times.append([f"{kind}, side by side", "", f"{took:.0f}"])
+        self.times.append(["all that is not timed", f"{elapsed:.0f}", ""])
+
+    def collected(self, kind):
+        """{key: (result, processor seconds)}; raises what a job raised."""
+        return {key: j.result() for key, j in self.jobs[kind].items()}
 
     def scene(self, name):
+        """Its yardsticks are submitted when it is first asked for."""
         if name not in self.scenes:
-            self.tell(f"yardsticks of {name}")
-            self.scenes[name] = Scene(name, self.work, *self.plan.samples[name])
+            scene = self.scenes[name] = Scene(name, self.work, *self.plan.samples[name])
+            self.submit(YARDSTICKS + name, {path: (ran, *words) for path, words in
+                                            scene.commands().items()})
         return self.scenes[name]
 
     def directory(self, name):
@@ -61,7 +113,7 @@ class Run:
         return path
 
     def minutes(self):
-        return (time.monotonic() - self.begun) / 60
+        return self.spent.seconds()[0] / 60
 
     def tell(self, what):
         print(f"report: {self.minutes():5.1f} min  {what}", file=sys.stderr, flush=True)
@@ -75,8 +127,8 @@ class Run:
 
 def head(run, begun, whole):
     """The bars, and what it all ran on."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    took = f"{run.minutes():.1f} minutes, {used.ru_utime + used.ru_stime:.0f} processor seconds"
+    elapsed, processor = run.spent.seconds()
+    took = f"{elapsed / 60:.1f} minutes, {processor:.0f} processor seconds"
     whole = Bar("this report", f"≤ {MINUTES} minutes on two processors", took,
                 run.minutes() <= MINUTES if whole and run.plan is PLAN else None)
     about = machine() + [("load", f"{begun:.1f} processes at the start, {load():.1f} at the end; this "
@@ -90,18 +142,35 @@ def head(run, begun, whole):
         where two threads share a core: trust ratios rather than seconds.""")
 
 
+def foot(run):
+    """Where the time went."""
+    yield Title("What this report took")
+    yield Words("""What is not timed is done first, one job on each processor at a time; the
+        sections then have the machine to themselves.""")
+    yield page.Table("", ["", "seconds", "processor seconds"], run.times)
+
+
 def write(run, names):
     """The page, anew after each section; one that fails says so. Names of those."""
     begun, blocks, failed = load(), [], []
+    sections = {**SECTIONS, **APART}
+    for name in names:
+        submit, _ = sections[name]
+        if submit:
+            submit(run)
+    run.finish_jobs()
     for i, name in enumerate(names):
+        spent = Spent()
         try:
-            blocks += SECTIONS[name](run)
+            blocks += sections[name][1](run)
         except Failed as e:
             print(f"report: {name}: {e}", file=sys.stderr)
             failed.append(name)
             blocks += [Title(name), Words(f"Could not be measured: {e}")]
+        run.times.append([name, *(f"{s:.0f}" for s in spent.seconds())])
         whole = len(names) == len(SECTIONS) == i + 1
-        page.write(run.out, "twopass: speed and accuracy", [*head(run, begun, whole), *blocks])
+        page.write(run.out, "twopass: speed and accuracy",
+                   [*head(run, begun, whole), *blocks, *foot(run)])
     return failed
 
 
@@ -112,8 +181,9 @@ def arguments():
     p.add_argument("--work", help="keep all files here (default: a temporary directory)")
     p.add_argument("--full", action="store_true", help="also what takes hours")
     p.add_argument("--quick", action="store_true", help="tiny samples")
-    p.add_argument("--only", action="append", choices=list(SECTIONS),
+    p.add_argument("--only", action="append", choices=[*SECTIONS, *APART],
                    help="this section, may be repeated")
+    p.add_argument("--readme", metavar="FILE", help="put the tables of these sections in this file")
     return p.parse_args()
 
 
@@ -123,9 +193,12 @@ def main():
     run = Run(FULL if o.full else QUICK if o.quick else PLAN, o.out, work)
     try:
         failed = write(run, o.only or list(SECTIONS))
+        if o.readme:
+            page.replace_tables(o.readme, run.readme)
     except Failed as e:
         sys.exit(f"report: {e}")
     finally:
+        run.pool.shutdown(cancel_futures=True)
         if not o.work:
             shutil.rmtree(work)
     print(f"{os.path.join(o.out, 'index.html')}, report.txt: {run.minutes():.1f} minutes")

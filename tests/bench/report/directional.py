@@ -1,6 +1,4 @@
 """Directional light: the paper's form factors and others, and lobes that become a mirror."""
-import tempfile
-
 import exponents
 import lobes
 from page import Bar, Table, Title, Words
@@ -12,23 +10,33 @@ SLOPED, SMALL = (30, 1000), 1e-3
 NEAR = 1.05                    # both are judged by the same particles, whose noise is common
 
 
+def compared(*arguments):
+    """Of lobes.compare, at once."""
+    return dict(lobes.compare(*arguments))
+
+
+def submit_schemes(run):
+    plan = run.plan
+    how = plan.lobe_schemes, plan.lobe_samples, plan.lobe_size
+    run.submit("lobes", {(scene, n): (compared, scene, n, *how)
+                         for scene in plan.lobe_scenes or lobes.SCENES for n in plan.lobe_exponents})
+
+
 def schemes(run):
     """The scheme of the paper beside those continued by rays."""
-    names, rows, wins, count = list(lobes.SCHEMES), [], 0, 0
-    for scene in run.told("lobes", run.plan.lobe_scenes or list(lobes.SCENES)):
-        for n in run.plan.lobe_exponents:
-            got = dict(lobes.compare(scene, n, names, run.plan.lobe_samples, run.plan.lobe_size))
-            count += 1
-            wins += got["default"].rms <= NEAR * got["paper"].rms
-            noise, stated = got["default"].noise, got["default"].stated
-            rows.append([scene, f"{n:g}", *(percent(got[s].rms) for s in names), percent(noise),
-                         percent(stated),
-                         *(f"{100 * got[s].flux:+.1f} %" for s in names),
-                         *(seconds(got[s].seconds) for s in names)])
+    names, rows, wins, count = run.plan.lobe_schemes, [], 0, 0
+    for (scene, n), (got, _) in run.collected("lobes").items():
+        count += 1
+        wins += got["default"].rms <= NEAR * got["paper"].rms
+        noise, stated = got["default"].noise, got["default"].stated
+        rows.append([scene, f"{n:g}", *(percent(got[s].rms) for s in names), percent(noise),
+                     percent(stated),
+                     *(f"{100 * got[s].flux:+.1f} %" for s in names),
+                     *(seconds(got[s].seconds) for s in names)])
     run.bars.append(Bar("directional form factors: the default beside the paper's",
                         "no worse anywhere", f"in {wins} of {count} scenes", wins == count))
     options = "; ".join(f"*{s}*: `ffcalc {' '.join(o)}`" if o else f"*{s}*: what `ffcalc` does"
-                        for s, o in lobes.SCHEMES.items())
+                        for s, o in lobes.SCHEMES.items() if s in names)
     yield Title("Directional form factors: the paper's scheme and others")
     yield Words(f"""Irradiance that only directional light brings, element by element, against
         {run.plan.lobe_samples:g} particles (`tests/bench/lobes.py`, which describes the scenes;
@@ -39,12 +47,15 @@ def schemes(run):
                      *(f"{s}: flux" for s in names), *(f"{s}: seconds" for s in names)], rows)
 
 
+def submit_exponents(run):
+    folder = run.directory("exponents")
+    run.submit("exponents", {n: (exponents.measure, n, folder) for n in (*run.plan.exponents, "inf")})
+
+
 def exponent(run):
     """Lobes of growing exponent beside the mirror."""
-    run.tell("exponents")
     known, mirror = exponents.series()
-    with tempfile.TemporaryDirectory() as folder:
-        got = {n: exponents.measure(n, folder) for n in (*run.plan.exponents, "inf")}
+    got = {n: result for n, (result, _) in run.collected("exponents").items()}
     finite, seen = [float(n) for n in run.plan.exponents], got["inf"][1]
     off = {float(n): (h / mirror - 1, l / seen - 1) for n, (h, l) in got.items() if n != "inf"}
     sloped = [n * off[n][0] for n in finite if SLOPED[0] <= n <= SLOPED[1]]

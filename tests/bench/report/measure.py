@@ -35,6 +35,15 @@ def ran(tool, *arguments, threads=None, seconds=3600):
     return Ran(elapsed, cpu, done.stdout + done.stderr)
 
 
+def job(function, *arguments):
+    """A call's result, and the processor seconds of the programs that it ran: for a process
+    of its own, whose children they are (jobs.py)."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    result = function(*arguments)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return result, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
 def fresh(path):
     """The path, with nothing there."""
     if os.path.exists(path):

@@ -54,6 +54,11 @@ class Table:
         lines = [self.caption, ""] if self.caption else []
         return "\n".join(lines + [pad(self.head), pad(rule), *map(pad, self.rows)])
 
+    def compact(self):
+        """As markdown that is not padded."""
+        rule = ["---" if c < self.left else "---:" for c in range(len(self.head))]
+        return "\n".join("| " + " | ".join(row) + " |" for row in [self.head, rule, *self.rows])
+
     def html(self):
         def row(cells, tag, mark=""):
             cells = "".join(f"<{tag}{' class=left' if c < self.left else ''}>{marked(cell)}</{tag}>"
@@ -136,3 +141,16 @@ def write(directory, title, blocks):
                 f"<h1>{html.escape(title)}</h1>\n{body}\n</body>\n</html>\n")
     with open(os.path.join(directory, "report.txt"), "w", encoding="utf-8") as f:
         f.write(f"# {title}\n\n" + "\n\n".join(b.text() for b in blocks) + "\n")
+
+
+def replace_tables(path, tables):
+    """Puts tables {name: Table} in a markdown file, each between the lines <!-- name --> and
+    <!-- end -->, where it has such."""
+    with open(path, encoding="utf-8") as f:
+        text = f.read()
+    for name, table in tables.items():
+        body = table.compact() + "\n"
+        place = re.compile(rf"(<!-- {name} -->\n).*?(?=<!-- end -->)", re.DOTALL)
+        text = place.sub(lambda found: found[1] + body, text)
+    with open(path, "w", encoding="utf-8") as f:
+        f.write(text)

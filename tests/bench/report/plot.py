@@ -41,7 +41,7 @@ class Panel:
         low = max(s for s in STEPS if s <= min(values))
         high = min(s for s in STEPS if s >= max(values))
         labels = [s for s in STEPS if low <= s <= high]
-        if len(labels) > 8:
+        if len(labels) > 12:
             labels = [s for s in labels if f"{s:e}".startswith("1.0")]
         return (f"set {name}range [{low:g}:{high if high > low else 2 * high:g}]\n"
                 f"set {name}tics ({', '.join(f'{s:g}' for s in labels)})")

@@ -22,9 +22,18 @@ def row(name, ours, theirs, unit):
     return [name, number(ours), number(theirs), share]
 
 
+def scenes(run):
+    return [name for name in ("cornell", "clutter") if name in run.plan.scenes]
+
+
+def submit(run):
+    for name in scenes(run):
+        run.scene(name)
+
+
 def section(run):
     threads, rows = len(os.sched_getaffinity(0)), []
-    for name in run.told("rates", [n for n in ("cornell", "clutter") if n in run.plan.scenes]):
+    for name in run.told("rates", scenes(run)):
         scene = run.scene(name)
         solved = Solved(scene, Solution("", ffcalc=["-m", "rays", "-n", 1024]))
         rays, read = bare(scene.path("mesh"), threads)

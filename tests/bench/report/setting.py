@@ -4,8 +4,9 @@ import os
 import shutil
 import statistics
 
-from chain import run, table
+from chain import run
 from measure import fresh, ran
+from yardstick import irradiance
 
 STATED = {  # what the programs say of their own errors
     "sampling": r"^sampling .*; ([\d.e+-]+) rms",
@@ -15,12 +16,13 @@ STATED_PICTURE = r"estimated relative rmse[ :]+([\d.e+-]+)"
 
 
 class Solution:
-    """Options of mesh, ffcalc and shoot; refined: how often the mesh is refined by the
-    solution and solved anew."""
+    """Options of mesh, ffcalc and shoot. refined: how often the mesh is refined (with
+    options of --refine) by a solution with form factors of other options, `earlier`."""
 
-    def __init__(self, name, mesh=(), ffcalc=(), shoot=(), refined=0, method=""):
-        self.name, self.method, self.refined = name, method, refined
-        self.mesh, self.ffcalc, self.shoot = list(mesh), list(ffcalc), list(shoot)
+    def __init__(self, name, mesh=(), ffcalc=(), refined=0, refine=(), earlier=None, method=""):
+        self.name, self.method, self.refined, self.refine = name, method, refined, list(refine)
+        self.mesh, self.ffcalc = list(mesh), list(ffcalc)
+        self.earlier = list(ffcalc if earlier is None else earlier)
 
     def of_default_mesh(self):
         return not self.mesh and not self.refined
@@ -39,21 +41,24 @@ class Solved:
         self.memory = max(stage.memory() or 0 for stage in self.stages)
         for name, pattern in STATED.items():
             self.stated[name] = self.stages[2].said(pattern)
-        rows = table(run("inspect", scene.path("rad"), "--csv").stdout)
-        self.elements = len(rows)
-        self.irradiance = scene.irradiance_error(rows) if solution.of_default_mesh() else None
+        self.elements = self.stages[0].said(r"^elements +(\d+)")
+        self.irradiance = None
+        if solution.of_default_mesh():
+            field = irradiance(run("inspect", scene.path("rad"), "--csv").stdout)
+            self.irradiance = scene.irradiance_error(field)
 
     def once(self, threads):
         scene, o = self.scene, self.solution
         mesh, ff, rad = (scene.path(e) for e in ("mesh", "ff", "rad"))
         total = None
         for round_ in range(o.refined + 1):
-            refine = ["--refine", rad] if round_ else []
+            refine = ["--refine", rad, *o.refine] if round_ else []
+            ffcalc = o.earlier if round_ < o.refined else o.ffcalc
             made = scene.path("refined.mesh")
             stages = [ran("mesh", *o.mesh, *refine, scene.gltf, "-o", fresh(made), threads=threads)]
             os.replace(made, mesh)
-            stages += [ran("ffcalc", *o.ffcalc, mesh, "-o", fresh(ff), threads=threads),
-                       ran("shoot", *o.shoot, mesh, ff, "-o", fresh(rad), threads=threads)]
+            stages += [ran("ffcalc", *ffcalc, mesh, "-o", fresh(ff), threads=threads),
+                       ran("shoot", mesh, ff, "-o", fresh(rad), threads=threads)]
             for before, stage in zip(total or (), stages):
                 stage.cpu += before.cpu
                 stage.elapsed += before.elapsed

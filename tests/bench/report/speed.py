@@ -1,22 +1,24 @@
 """Speed against error of all stages: each method of ffcalc at four settings, and other
 settings of mesh, through the chain on cornell, two-pass and clutter."""
+from chain import Failed
 from page import Table, Title, Words
 from plot import Curve, Panel, draw
 from setting import Solution, Solved, View
-from yardstick import Scene
 
 METHODS = {  # options of ffcalc, from fast to fine
     "hemicube": ["-n 16 -p 4", "-n 32 -p 4", "-n 32 -p 16", "-n 64 -p 16"],
     "rays": ["-n 256", "-n 1024", "-n 4096", "-n 16384"],
     "auto": ["-n 256 -t 1e-3", "-n 1024 -t 1e-3", "-n 4096 -t 1e-4", "-n 16384 -t 1e-5"],
     "analytic": ["-n 256 -t 1e-2", "-n 1024 -t 1e-3", "-n 4096 -t 1e-4", "-n 16384 -t 1e-5"]}
-OTHERS = [Solution("all defaults"),
-          Solution("`mesh -e 2%`", ["-e", "2%"]),
+DEFAULTS = ("auto", "-n 4096 -t 1e-4")
+OTHERS = [Solution("`mesh -e 2%`", ["-e", "2%"]),
           Solution("`mesh -e 2%`, `ffcalc -n 16384`", ["-e", "2%"], ["-n", 16384])]
+LONG = ("two-pass", "analytic")
 # One position in a pixel, its centre, for the yardstick has that too.
 SMOOTH = ["-d", "mesh", "--samples", 1, "--lobe-samples", 16]
 HEAD = ["scene", "setting", "mesh", "ffcalc", "shoot", "first view", "further view", "MB",
         "picture", "of reference", "bias", "99 %", "irradiance", "of reference"]
+README = (0, 1, 3, 4, 5, 8, 10, 12)  # its columns
 
 
 def percent(x, digits=1):
@@ -29,7 +31,7 @@ def seconds(x):
 
 def tail(errors):
     """The 99th percentile, unless most of it may be the yardstick's noise."""
-    return percent(errors.tail if errors.noise <= errors.tail / 2 else None)
+    return percent(errors.tail[99] if errors.noise[99] <= errors.tail[99] / 2 else None)
 
 
 class Row:
@@ -53,7 +55,10 @@ def solutions(scene, plan):
     for method in plan.methods(scene.name):
         for options in METHODS[method][:plan.settings(scene.name, method)]:
             words = ["-m", method, *options.split()]
-            yield Solution(f"`-m {method} {options}`", ffcalc=words, method=method)
+            name = f"`-m {method} {options}`"
+            if (method, options) == DEFAULTS:
+                name += ", the defaults"
+            yield Solution(name, ffcalc=words, method=method)
     yield from OTHERS[:plan.settings(scene.name, None)]
 
 
@@ -76,24 +81,33 @@ def panels(name, rows, ladders):
                   "relative rmse, %", lit + dashed[1:])]
 
 
+def submit(run):
+    for name in run.plan.scenes:
+        run.scene(name)
+
+
 def section(run):
     """Fills run.rows and the scenes' yardsticks."""
-    rows, drawn = [], []
+    rows, drawn, failed = [], [], []
     for name in run.plan.scenes:
         scene = run.scene(name)
-        mine = [Row(scene, solution, run.plan.repeat)
-                for solution in run.told(f"speed against error, {name}", solutions(scene, run.plan))]
+        mine = []
+        for solution in run.told(f"speed against error, {name}", solutions(scene, run.plan)):
+            try:
+                mine.append(Row(scene, solution, run.plan.repeat))
+            except Failed as e:
+                failed.append(f"{name}, {solution.name}: {e}")
         ladders = (scene.picture_ladder(run.plan.ladder), scene.irradiance_ladder(run.plan.crowd))
         run.rows += mine
         rows += [r.cells(ladders) for r in mine]
         drawn += panels(name, mine, ladders)
     yield Title("Speed against error of all stages")
     yield Words(f"""Processor seconds of each stage, of all threads together; medians of
-        {run.plan.repeat}. `trace` runs with `{' '.join(map(str, SMOOTH))}`, also for all
+        {run.plan.repeat}. `trace` runs with `{' '.join(map(str, SMOOTH))}`, also for the
         defaults; a further view is one more camera in the same run. *MB* is the peak of memory.
         *Picture* is the relative rmse of the first view at the centres of its pixels, *bias*
         of its mean, *99 %* the 99th percentile of the relative error of pixels (lengths over
-        R, G, B; without the yardstick's noise to first order, – where that is more than half),
+        R, G, B; without the yardstick's noise, – where that is more than half),
         all without the pixels that see a lamp or nothing. *Irradiance* is the relative rmse of
         elements, weighted by area. *Of reference* is what `reference` reaches in the same
         processor seconds, between runs of {listed(run.plan.ladder)} paths a pixel and
@@ -104,7 +118,35 @@ def section(run):
         for s in run.scenes.values()) + ". " + run.plan.left_out())
     yield draw(run.out, "speed", "error against processor seconds of four methods of form factors "
                "in three scenes, picture and irradiance, beside path tracing", drawn)
+    run.readme["speed"] = short(rows)
     yield Table("", HEAD, rows, left=2)
+    if failed:
+        yield Words("Could not be had: " + "; ".join(failed) + ".")
+
+
+def short(rows):
+    """The README's table."""
+    pick = lambda row: [row[c] for c in README]
+    return Table("", pick(HEAD), [pick(row) for row in rows], left=2)
+
+
+def submit_long(run):
+    run.scene(LONG[0])
+
+
+def long_section(run):
+    """The settings of a scene and a method that take minutes each."""
+    name, method = LONG
+    scene, rows = run.scene(name), []
+    for options in run.told(f"{method} on {name}", METHODS[method]):
+        words = ["-m", method, *options.split()]
+        solution = Solution(f"`{' '.join(words)}`", ffcalc=words, method=method)
+        rows.append(Row(scene, solution, run.plan.repeat))
+    ladders = (scene.picture_ladder(run.plan.ladder), scene.irradiance_ladder(run.plan.crowd))
+    cells = [row.cells(ladders) for row in rows]
+    run.readme["speed-long"] = short(cells)
+    yield Title(f"Speed against error: {method} on {name}")
+    yield Table("", HEAD, cells, left=2)
 
 
 def listed(numbers):
@@ -117,4 +159,4 @@ def mine_of(rows, name):
 
 def noise(rows):
     """Of the yardstick, in the 99th percentile."""
-    return rows[0].view.errors.noise if rows else None
+    return rows[0].view.errors.noise[99] if rows else None

@@ -4,6 +4,9 @@ their variance in it, whatever that is.
 
 Pictures are of pixel centres, and judged at every third pixel each way: nine times the paths
 in each for the same time, which costs less accuracy than it gains."""
+import csv
+import functools
+import io
 import json
 import math
 import os
@@ -12,7 +15,7 @@ import sys
 
 import numpy as np
 
-from chain import TOP, Failed, picture, run, table
+from chain import TOP, Failed, picture, run
 from measure import fresh, ran
 
 VIEWS = {"cornell": ("classic", 256, 256), "two-pass": ("overview", 320, 240),
@@ -44,20 +47,25 @@ class Lattice:
         return 2 * math.atan(math.tan(yfov / 2) * self.STEP * self.places[1][0] / self.height)
 
 
-class Errors:
-    """Of a picture, all relative: rmse, bias of the mean, 99th percentile of pixels (lengths
-    over R, G, B, as exrcmp has them), and what that is of the yardstick itself.
+QUANTILES = (95, 99)
 
-    Noise widens the percentile, to first order by its variance. Half the paths have twice
+
+class Errors:
+    """Of a picture, all relative: rmse, bias of the mean, percentiles of pixels by QUANTILES
+    (lengths over R, G, B, as exrcmp has them), and what these are of the yardstick itself.
+
+    Noise widens a percentile: its square by about the variance. Half the paths have twice
     that, so that it can be taken off: what is found with half is as much beyond what is found
-    with all as this is beyond the truth."""
+    with all as this is beyond the truth, in squares."""
 
     def __init__(self, a, b, c):
         self.rmse, self.bias = off(a, b, c), float(np.mean(a) / np.mean((b + c) / 2) - 1)
         mean = (b + c) / 2
-        tail = lambda x: float(np.percentile(length(x) / length(mean), 99))
-        self.tail = max(0, 2 * tail(a - mean) - (tail(a - b) + tail(a - c)) / 2)
-        self.noise = tail((b - c) / 2)
+        tail = lambda x, q: float(np.percentile(length(x) / length(mean), q))
+        square = lambda x, q: tail(x, q) ** 2
+        self.tail = {q: math.sqrt(max(0, 2 * square(a - mean, q) -
+                                      (square(a - b, q) + square(a - c, q)) / 2)) for q in QUANTILES}
+        self.noise = {q: tail((b - c) / 2, q) for q in QUANTILES}
 
 
 def length(colours):
@@ -93,9 +101,21 @@ class Ladder:
         return math.exp(np.interp(t, x, y) - beyond / 2)
 
 
+def irradiance(text):
+    """Of the lines of `inspect --csv` or `reference --irradiance`, much faster than table():
+    element-sides, areas, H [side, band]."""
+    lines = csv.reader(io.StringIO(text))
+    at = {name: i for i, name in enumerate(next(lines))}
+    element, side, area, *h = (at[n] for n in ("element", "side", "area", "H_0", "H_1", "H_2"))
+    rows = [(r[element] + r[side][0], r[area], *(r[k] for k in h)) for r in lines]
+    numbers = np.array([r[1:] for r in rows], float)
+    return [r[0] for r in rows], numbers[:, 0], numbers[:, 1:]
+
+
 class Scene:
     """A scene in a directory of its own. samples: paths a pixel and particles of the
-    yardsticks, each in two halves. Those found in the directory are taken."""
+    yardsticks, each in two halves, which commands() makes. Those found in the directory
+    are taken."""
 
     def __init__(self, name, work, samples, particles):
         self.name, self.work = name, os.path.join(work, name)
@@ -115,11 +135,7 @@ class Scene:
             json.dump(root, f)
         run("mesh", self.gltf, "-o", self.path("default.mesh"))
         run("mesh", self.path("lattice.gltf"), "-o", self.path("lattice.mesh"))
-        self.reference_cpu = 0.0
-        self.exact = [self.reference_picture(samples // 2, seed) for seed in (1, 2)]
-        self.lit = [self.reference_irradiance(particles // 2, seed) for seed in (1, 2)] \
-            if particles else []
-        self.keep = None
+        self.ladders, self.keep = {}, None
 
     def copy_scene(self):
         kept = os.path.join(TOP, "scenes", self.name + ".gltf")
@@ -139,46 +155,71 @@ class Scene:
 
     # ---- what `reference` makes ----
 
-    def reference_picture(self, samples, seed):
-        path = self.path(f"{samples}.{seed}.exr")
-        if not os.path.exists(path):
-            self.reference_cpu += ran("reference", self.path("lattice.mesh"), "-c", self.camera,
-                                      "-s", self.lattice.size, "--centre", "--seed", seed,
-                                      "--samples", samples, "--compression", "none", "-o", path).cpu
+    def drawn(self, samples, seed, path):
+        """Arguments of `reference` for a picture at the lattice's pixels."""
+        return ("reference", self.path("lattice.mesh"), "-c", self.camera, "-s", self.lattice.size,
+                "--centre", "--seed", seed, "--samples", samples, "--compression", "none", "-o", path)
+
+    def counted(self, particles, seed, path):
+        return ("reference", self.path("default.mesh"), "--irradiance", "--seed", seed, "--samples",
+                particles, "-o", path)
+
+    def yardsticks(self):
+        """{file: how it is made}, pictures first."""
+        kinds = ((self.drawn, self.samples, "exr"), (self.counted, self.particles, "csv"))
+        paths = [(make, count // 2, seed, self.path(f"{count // 2}.{seed}.{extension}"))
+                 for make, count, extension in kinds for seed in (1, 2) if count]
+        return {path: make(count, seed, path) for make, count, seed, path in paths}
+
+    def commands(self):
+        """Of the yardsticks that are not there yet, by file."""
+        return {path: words for path, words in self.yardsticks().items() if not os.path.exists(path)}
+
+    @functools.cached_property
+    def exact(self):
+        """Two independent pictures [band, y, x]."""
+        return [self.colours(path) for path in self.yardsticks() if path.endswith("exr")]
+
+    @functools.cached_property
+    def lit(self):
+        """Two independent fields of irradiance."""
+        return [self.field(path) for path in self.yardsticks() if path.endswith("csv")]
+
+    @staticmethod
+    def colours(path):
         planes = picture(path)
         return np.array([planes[c] for c in "RGB"])
 
-    def reference_irradiance(self, particles, seed):
-        path = self.path(f"{particles}.{seed}.csv")
-        if not os.path.exists(path):
-            self.reference_cpu += ran("reference", self.path("default.mesh"), "--irradiance", "--seed",
-                                      seed, "--samples", particles, "-o", path).cpu
+    @staticmethod
+    def field(path):
         with open(path) as f:
-            return table(f.read())
+            return irradiance(f.read())
 
     def picture_ladder(self, counts):
         """Of `reference`, as if it drew the whole picture."""
-        ladder = Ladder()
-        for samples in counts:
-            out = fresh(self.path("ladder.exr"))
-            took = ran("reference", self.path("lattice.mesh"), "-c", self.camera, "-s",
-                       self.lattice.size, "--centre", "--seed", 100 + samples, "--samples", samples,
-                       "--compression", "none", "-o", out)
-            planes = picture(out)
-            a = np.array([planes[c] for c in "RGB"])
-            ladder.add(took.cpu * self.lattice.whole / self.lattice.pixels,
-                       off(*(x[:, self.seen()] for x in (a, *self.exact))))
-        return ladder
+        def climb():
+            for samples in counts:
+                out = fresh(self.path("ladder.exr"))
+                took = ran(*self.drawn(samples, 100 + samples, out))
+                yield (took.cpu * self.lattice.whole / self.lattice.pixels,
+                       off(*(x[:, self.seen()] for x in (self.colours(out), *self.exact))))
+        return self.ladder("picture", climb)
 
     def irradiance_ladder(self, counts):
-        ladder = Ladder()
-        for particles in counts:
-            out = fresh(self.path("ladder.csv"))
-            took = ran("reference", self.path("default.mesh"), "--irradiance", "--seed",
-                       100 + particles, "--samples", particles, "-o", out)
-            with open(out) as f:
-                ladder.add(took.cpu, self.irradiance_error(table(f.read())))
-        return ladder
+        def climb():
+            for particles in counts:
+                out = fresh(self.path("ladder.csv"))
+                took = ran(*self.counted(particles, 100 + particles, out))
+                yield took.cpu, self.irradiance_error(self.field(out))
+        return self.ladder("irradiance", climb)
+
+    def ladder(self, kind, climb):
+        """Measured once."""
+        if kind not in self.ladders:
+            self.ladders[kind] = Ladder()
+            for point in climb():
+                self.ladders[kind].add(*point)
+        return self.ladders[kind]
 
     # ---- what is judged ----
 
@@ -198,11 +239,8 @@ class Scene:
         a = np.array([self.lattice.pick(planes[c]) for c in "RGB"])
         return Errors(*(x[:, self.seen()] for x in (a, *self.exact)))
 
-    def irradiance_error(self, rows):
+    def irradiance_error(self, field):
         """Of element-sides, weighted by area; None if they are not those of the yardstick."""
-        tables = [rows, *self.lit]
-        places = [[(r["element"], r["side"][0]) for r in t] for t in tables]
-        if not self.lit or places[0] != places[1]:
+        if not self.lit or field[0] != self.lit[0][0]:
             return None
-        area = np.array([r["area"] for r in rows])
-        return off(*(np.array([[r[f"H_{k}"] for r in t] for k in range(3)]) for t in tables), area)
+        return off(*(h.T for _, _, h in (field, *self.lit)), field[1])
