@@ -133,6 +133,14 @@ static size_t stencil(const struct job *j, size_t e, struct near *near)
 	return 0;
 }
 
+/* Channels of an element that are anything but 0: of one side or of both. */
+static size_t channels_of(const struct job *j, size_t e)
+{
+	int sides = model_side_modelled(j->m, 2 * j->m->element_patch[e] + BACK) ? 2 : 1;
+
+	return (size_t)sides * PARTS * (size_t)j->s->bands;
+}
+
 static void differences(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct job *j = arg;
@@ -141,8 +149,8 @@ static void differences(void *arg, size_t begin, size_t end, int thread)
 
 	(void)thread;
 	for (size_t e = begin; e < end; e++) {
-		size_t n = stencil(j, e, near);
-		for (size_t c = 0; c < channels; c++) {
+		size_t n = stencil(j, e, near), some = channels_of(j, e);
+		for (size_t c = 0; c < some; c++) {
 			double d = j->h[e * channels + c], noise = j->variance[e * channels + c];
 			for (size_t i = 0; i < n; i++) {
 				size_t at = near[i].element * channels + c;
@@ -260,8 +268,9 @@ static void errors(void *arg, size_t begin, size_t end, int thread)
 		size_t n = list_near(j, e, 1, near);
 		double *to = &j->s->discretisation[2 * e * bands];
 		double *direct = &j->s->discretisation_direct[2 * e * bands];
+		size_t some = channels_of(j, e);
 		memset(to, 0, 2 * bands * sizeof *to);
-		for (size_t c = 0; c < channels; c++) {
+		for (size_t c = 0; c < some; c++) {
 			struct moments m = { 0 };
 			add(j, e, e * channels + c, &m);
 			for (size_t i = 0; i < n; i++)

@@ -111,7 +111,8 @@ static int gather(struct ff_job *j, struct ff_stats *stats, const struct progres
 
 	if (!j->o.gather || j->o.method == FF_HEMICUBE)
 		return 0;
-	return ff_gather(j, &stats->rays, &inner, e) || (j->gather.rays && ff_share_rays(j, e)) ? -1 : 0;
+	return ff_gather(j, &stats->rays, &inner, e) ||
+	       (j->gather.rays && ff_share_rays(j, e)) ? -1 : 0;
 }
 
 /* Patches [begin, end), or lights, numbered behind the patches. */

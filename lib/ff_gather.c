@@ -442,10 +442,11 @@ static double landing(const struct ff_thread *t, uint32_t ps, uint32_t cast, dou
 int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_weight *w)
 {
 	const struct ff_job *j = t->job;
-	double sum = ff_row_is_seen(j, ps) ? ff_see(t, ps, ff_row_rays(j, ps), &t->tally.err) : recall(t, ps);
+	int seen = ff_row_is_seen(j, ps);
+	double sum = seen ? ff_see(t, ps, ff_row_rays(j, ps), &t->tally.err) : recall(t, ps);
 	struct tale a = add_up(t, sum);
 	double rays, said = landing(t, ps, cast, &rays), lands = settle(said, rays, &a);
-	double per_sample = a.sample / (ff_row_is_seen(j, ps) ? 1 : worth(j->gather.rays));
+	double per_sample = a.sample / (seen ? 1 : worth(j->gather.rays));
 
 	if (t->tally.err.set || !(lands > 0 && sum > 0) ||
 	    fabs(sum - said) > misfit * said + 3 * sqrt(fmax(sum, said) / rays))

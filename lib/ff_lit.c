@@ -15,9 +15,9 @@ static void direct_light(const struct ff_job *j, double *flux)
 
 	for (uint32_t source = 0; source < 2 * j->m->patches; source++)
 		for (uint64_t i = g->start[source]; j->emits[source] && i < g->start[source + 1]; i++) {
-			uint32_t element = g->seen[i].column >> 1;
-			flux[2 * j->m->element_patch[element] + (g->seen[i].column & 1)] +=
-				j->m->element_area[element] * g->seen[i].count / ff_gather_rays(j, element);
+			const struct ff_gathered *s = &g->seen[i];
+			uint32_t el = s->column >> 1, ps = 2 * j->m->element_patch[el] + (s->column & 1);
+			flux[ps] += j->m->element_area[el] * s->count / ff_gather_rays(j, el);
 		}
 }
 
@@ -38,9 +38,12 @@ int ff_most_halvings(uint32_t rays)
 int ff_share_rays(struct ff_job *j, struct err *e)
 {
 	size_t sides = 2 * j->m->patches, rows = 0;
-	double *flux = mem_new(sides, sizeof *flux, "direct light", e), area = 0, all = 0, sum = 0;
+	double *flux, area = 0, all = 0, sum = 0;
 	int most = ff_most_halvings(j->o.rays);
 
+	if (j->m->light.n) /* no ray meets these, so nothing is known of what they light */
+		return 0;
+	flux = mem_new(sides, sizeof *flux, "direct light", e);
 	j->halvings = mem_new(sides, 1, "direct light", e);
 	if (!flux || !j->halvings) {
 		free(flux);

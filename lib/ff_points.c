@@ -74,7 +74,8 @@ int ff_points(struct ff_job *j, struct err *e)
 		return 0;
 	if (gather / 4 >= GATHER_FEWEST)
 		j->small_area = small_area(j->m);
-	return fill_samples(&j->of_rows, each >> ff_most_halvings(j->o.rays), (uint64_t)each * j->o.emitter_gain, e) ||
+	uint32_t least = each >> ff_most_halvings(j->o.rays);
+	return fill_samples(&j->of_rows, least, (uint64_t)each * j->o.emitter_gain, e) ||
 	       fill_samples(&j->of_gathering, gather, gather, e) ||
 	       fill_samples(&j->of_small, gather / 4, gather / 4, e) ? -1 : 0;
 }

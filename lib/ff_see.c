@@ -225,8 +225,9 @@ static struct ff_sight see_close(struct ff_thread *t, uint32_t source, uint32_t 
 {
 	if (!faces(t->job, source, column))
 		return (struct ff_sight){ 0 };
-	return unhidden(t->job, source, column) > plenty ? by_rays(t, source, column)
-	                                                 : by_pairs(t, source, column, MOST_PAIRS, draw_direction);
+	return unhidden(t->job, source, column) > plenty
+	       ? by_rays(t, source, column)
+	       : by_pairs(t, source, column, MOST_PAIRS, draw_direction);
 }
 
 /* An element-side's sight of the source, to be trusted as far as `rays` rays of the row;

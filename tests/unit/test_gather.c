@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "../../lib/ff_job.h"
 #include "memory_ff.h"
 #include "shapes.h"
 
@@ -145,7 +146,7 @@ static void gathered(void **state)
 	model_free(&m);
 }
 
-static void seen(void **state)
+static void emitter_seen(void **state)
 {
 	struct model m;
 	struct ff_options sees = options(256);
@@ -299,11 +300,57 @@ static void any_threads(void **state)
 	model_free(&m);
 }
 
+/* Rays of all rows that cast as many as they carry light, over those of all rows alike; the
+ * most that one casts, and the fewest. */
+static double shared_rays(double emission, uint32_t *most, uint32_t *least)
+{
+	struct model m;
+	struct ff_job j;
+	struct ff_options o = options(64);
+	struct err e = { 0 };
+	double rays = 0, sum = 0, rows = 0;
+
+	make(&m, emission, 0);
+	assert_int_equal(ff_job_init(&j, &m, &o, &e) || ff_job_prepare(&j, 1, &e) ||
+	                 ff_gather(&j, &rays, NULL, &e) || ff_share_rays(&j, &e), 0);
+	*most = 0, *least = UINT32_MAX;
+	for (uint32_t ps = 0; ps < 2 * m.patches; ps++) {
+		uint32_t n = ff_row_rays(&j, ps);
+		if (j.emits[ps])
+			assert_int_equal(n, o.rays * o.emitter_gain);
+		if (j.emits[ps] || !j.shoots_diffuse[ps])
+			continue;
+		rows++;
+		sum += n;
+		*most = n > *most ? n : *most;
+		*least = n < *least ? n : *least;
+	}
+	ff_job_free(&j);
+	model_free(&m);
+	return sum / (rows * o.rays);
+}
+
+static void rays_go_where_light_is(void **state)
+{
+	uint32_t most, least;
+
+	(void)state;
+	assert_true(shared_rays(0, &most, &least) == 1);
+	double part = shared_rays(1, &most, &least);
+	assert_true(part > .5 && part < .95);
+	assert_int_equal(most, 4096);
+	assert_true(least >= 4096 >> FF_HALVINGS && least < 4096);
+	assert_int_equal(ff_most_halvings(8), 1);
+	assert_int_equal(ff_most_halvings(4 * 3), 0);
+	assert_int_equal(ff_most_halvings(4096), FF_HALVINGS);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(rays_go_where_light_is),
 		cmocka_unit_test(gathered),
-		cmocka_unit_test(seen),
+		cmocka_unit_test(emitter_seen),
 		cmocka_unit_test(hidden),
 		cmocka_unit_test(open_scene),
 		cmocka_unit_test(close_by),

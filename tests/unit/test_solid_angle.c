@@ -64,7 +64,8 @@ static void samples(void **state)
 				double edge[3];
 				v3_cross(v[k], v[(k + 1) % 3], edge);
 				double side = v3_dot(edge, v[(k + 2) % 3]);
-				assert_true(v3_dot(edge, dir) / v3_length(edge) * side >= -1e-9 * fabs(side));
+				double off = v3_dot(edge, dir) / v3_length(edge);
+				assert_true(off * side >= -1e-9 * fabs(side));
 			}
 			v3_mad(sum, angle / N, dir, sum);
 		}
