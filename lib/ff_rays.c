@@ -37,18 +37,13 @@ void ff_hit_point(const struct ff_job *j, const struct ray_hit *hit, double x[3]
 {
 	const uint32_t *corner = &j->m->triangle[3 * (size_t)hit->triangle];
 	const double *v[3];
-	double edge[2][3], normal[3], w[3], sum = 0;
+	double w[3] = { hit->w[0], hit->w[1], hit->w[2] };
 
 	for (int i = 0; i < 3; i++)
 		v[i] = &j->m->vertex[3 * (size_t)corner[i]];
-	v3_sub(v[1], v[0], edge[0]);
-	v3_sub(v[2], v[0], edge[1]);
-	v3_cross(edge[0], edge[1], normal);
-	double least = fmin(.1, 4 * ray_offset(j->rays) / sqrt(v3_length(normal)));
-	for (int i = 0; i < 3; i++)
-		sum += w[i] = fmax(hit->w[i], least);
+	ray_clear_of_edges(j->rays, v, w);
 	for (int k = 0; k < 3; k++)
-		x[k] = (w[0] * v[0][k] + w[1] * v[1][k] + w[2] * v[2][k]) / sum;
+		x[k] = w[0] * v[0][k] + w[1] * v[1][k] + w[2] * v[2][k];
 }
 
 /* The direction of a flight that goes on by event `slot`, n the normal of the side it

@@ -29,9 +29,7 @@ static void fill_element(const struct ff_job *j, uint32_t i)
 	const uint32_t *c = &m->element[3 * (size_t)i];
 	const double *a = &m->vertex[3 * (size_t)c[0]];
 	const double *normal = &m->element_normal[3 * (size_t)i];
-	/* Clear of walls along the edges by a few float32 steps of the scene, but never
-	 * far from where the sample belongs. */
-	double inset = fmin(.2, 4 * ray_offset(j->rays) / sqrt(m->element_area[i]));
+	double inset = ray_inset(j->rays, m->element_area[i]);
 	double tangent[2][3];
 
 	v3_frame(normal, tangent[0], tangent[1]);

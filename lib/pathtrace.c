@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "bsdf.h"
 #include "light.h"
@@ -138,6 +139,19 @@ int pathtrace_misses(const struct pathtrace *p)
 	return p->m->light.n && !p->ways.images.complete;
 }
 
+/* A point of a triangle from its corners, which is closer to the plane than along a ray. */
+static void place(const struct pathtrace *p, size_t triangle, double w[3], double x[3])
+{
+	const uint32_t *c = &p->m->triangle[3 * triangle];
+	const double *corner[3];
+
+	for (int i = 0; i < 3; i++)
+		corner[i] = &p->m->vertex[3 * (size_t)c[i]];
+	ray_clear_of_edges(p->rays, corner, w);
+	for (int k = 0; k < 3; k++)
+		x[k] = w[0] * corner[0][k] + w[1] * corner[1][k] + w[2] * corner[2][k];
+}
+
 int pathtrace_meet(const struct pathtrace *p, const double org[3], const double dir[3],
                    struct vertex *v)
 {
@@ -147,19 +161,13 @@ int pathtrace_meet(const struct pathtrace *p, const double org[3], const double 
 	ray_nearest(p->rays, org, dir, &hit);
 	if (hit.triangle == RAY_MISS)
 		return 0;
-	const uint32_t *c = &m->triangle[3 * (size_t)hit.triangle];
 	v->triangle = hit.triangle;
 	v->material = material_of(m, hit.triangle);
 	v->n = &p->normal[3 * (size_t)hit.triangle];
 	v->side = v3_dot(v->n, dir) > 0 ? BACK : FRONT;
 	v->t = hit.t;
-	for (size_t k = 0; k < 3; k++) {
-		v->w[k] = hit.w[k];
-		/* from the corners: closer to the plane than along the ray */
-		v->x[k] = hit.w[0] * m->vertex[3 * (size_t)c[0] + k] +
-		          hit.w[1] * m->vertex[3 * (size_t)c[1] + k] +
-		          hit.w[2] * m->vertex[3 * (size_t)c[2] + k];
-	}
+	memcpy(v->w, hit.w, sizeof v->w);
+	place(p, hit.triangle, hit.w, v->x);
 	return 1;
 }
 
@@ -187,12 +195,8 @@ const struct emitter *pathtrace_emitter(const struct pathtrace *p, const double 
 		else
 			hi = mid;
 	}
-	const uint32_t *c = &p->m->triangle[3 * (size_t)p->emitter[lo].triangle];
 	double s = sqrt(u[1]), w[3] = { 1 - s, s * (1 - u[2]), s * u[2] };
-	for (size_t k = 0; k < 3; k++)
-		x[k] = w[0] * p->m->vertex[3 * (size_t)c[0] + k] +
-		       w[1] * p->m->vertex[3 * (size_t)c[1] + k] +
-		       w[2] * p->m->vertex[3 * (size_t)c[2] + k];
+	place(p, p->emitter[lo].triangle, w, x);
 	return &p->emitter[lo];
 }
 

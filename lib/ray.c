@@ -249,6 +249,26 @@ void ray_leave(const struct ray_scene *s, const double n[3], double x[3])
 	v3_mad(x, offset_units * s->unit, n, x);
 }
 
+double ray_inset(const struct ray_scene *s, double area)
+{
+	/* Measured: of 1e7 rays in a box one escapes with 4, none with 16. */
+	return fmin(.2, 16 * ray_offset(s) / sqrt(area));
+}
+
+void ray_clear_of_edges(const struct ray_scene *s, const double *const corner[3], double w[3])
+{
+	double n[3], sum = 0;
+
+	v3_area(corner[0], corner[1], corner[2], n);
+	double least = ray_inset(s, v3_length(n)) / 3;
+	if (w[0] >= least && w[1] >= least && w[2] >= least)
+		return;
+	for (int i = 0; i < 3; i++)
+		sum += w[i] = fmax(w[i], least);
+	for (int i = 0; i < 3; i++)
+		w[i] /= sum;
+}
+
 void ray_nearest(const struct ray_scene *s, const double org[3], const double dir[3],
                  struct ray_hit *hit)
 {
