@@ -31,7 +31,8 @@ double batch_put_value(struct ff_batch *b, uint32_t column, double w)
 	return (double)(((float *)b->value.data)[b->value.n++] = (float)w);
 }
 
-double batch_put_values(struct ff_batch *b, const uint32_t *column, const void *x, size_t n, double scale)
+double batch_put_values(struct ff_batch *b, const uint32_t *column, const void *x, size_t n,
+                        double scale)
 {
 	uint32_t *to = (uint32_t *)b->column.data + b->column.n;
 	float *narrow = b->f64 ? NULL : (float *)b->value.data + b->value.n;

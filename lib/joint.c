@@ -76,7 +76,8 @@ int joint_reaches(const struct facet *a, const struct joint *ja, const struct fa
 /* Heights of four points above a facet's plane. */
 static four heights(const struct facet *f, const double (*x)[4])
 {
-	return f->normal[0] * four_load(x[0]) + f->normal[1] * four_load(x[1]) + f->normal[2] * four_load(x[2]) - f->offset;
+	return f->normal[0] * four_load(x[0]) + f->normal[1] * four_load(x[1]) +
+	       f->normal[2] * four_load(x[2]) - f->offset;
 }
 
 /* r^4 from four points to one. */
@@ -181,7 +182,8 @@ static inline four r4_to(const struct quad *q, size_t points, size_t i, four x, 
 }
 
 /* The sum of h / r^4 over the four points of q as seen from one. */
-static inline four sum_from(const struct quad *q, size_t points, const four h[4], four x, four y, four z)
+static inline four sum_from(const struct quad *q, size_t points, const four h[4], four x, four y,
+                            four z)
 {
 	four p[4];
 

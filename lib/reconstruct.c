@@ -16,7 +16,8 @@
  * which keep its sum over a surface, and added: noise cancels in it, bias does not. */
 
 /* Mean over an element of vector v of what its corners have. */
-static lanes corner_mean(const struct reconstruct_job *j, const lanes *at_groups, size_t element, size_t v)
+static lanes corner_mean(const struct reconstruct_job *j, const lanes *at_groups, size_t element,
+                         size_t v)
 {
 	const uint32_t *g = &j->g.group[3 * element];
 
@@ -118,7 +119,8 @@ static void run(struct reconstruct_job *j, int threads)
 }
 
 /* The channels of an element-side in rows of elements, from `column` on. */
-static double *channels_of(const struct reconstruct_job *j, lanes *rows, size_t element_side, size_t column)
+static double *channels_of(const struct reconstruct_job *j, lanes *rows, size_t element_side,
+                           size_t column)
 {
 	return (double *)(rows + element_side / 2 * j->vectors) +
 	       element_side % 2 * (size_t)j->columns + column;
