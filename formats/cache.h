@@ -14,7 +14,7 @@
 #define REVISION_MESH "7"
 #define REVISION_FF "16"
 #define REVISION_RAD "13"
-#define REVISION_VIEW "9"
+#define REVISION_VIEW "10"
 
 /* Strings are owned (malloc) and may be NULL. */
 struct cache_info {

@@ -35,15 +35,7 @@ static void capture(struct ff_thread *t, uint32_t source, uint32_t chain, double
 
 void ff_hit_point(const struct ff_job *j, const struct ray_hit *hit, double x[3])
 {
-	const uint32_t *corner = &j->m->triangle[3 * (size_t)hit->triangle];
-	const double *v[3];
-	double w[3] = { hit->w[0], hit->w[1], hit->w[2] };
-
-	for (int i = 0; i < 3; i++)
-		v[i] = &j->m->vertex[3 * (size_t)corner[i]];
-	ray_clear_of_edges(j->rays, v, w);
-	for (int k = 0; k < 3; k++)
-		x[k] = w[0] * v[0][k] + w[1] * v[1][k] + w[2] * v[2][k];
+	ray_point(j->rays, j->m, hit->triangle, hit->w, x);
 }
 
 /* The direction of a flight that goes on by event `slot`, n the normal of the side it

@@ -31,22 +31,17 @@ void light_ways_free(struct light_ways *w)
 	light_images_free(&w->images);
 }
 
-/* Where a ray meets a surface: front normal and place, which from the corners is closer to
- * the plane than along the ray. */
+/* Where a ray meets a surface: front normal and place. */
 static uint32_t place(const struct light_ways *w, const struct ray_hit *hit, double n[3],
                       double x[3])
 {
 	const struct model *m = w->m;
 	const uint32_t *c = &m->triangle[3 * (size_t)hit->triangle];
-	const double *corner[3];
 
-	for (int i = 0; i < 3; i++)
-		corner[i] = &m->vertex[3 * (size_t)c[i]];
-	v3_area(corner[0], corner[1], corner[2], n);
+	v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
+	        &m->vertex[3 * (size_t)c[2]], n);
 	v3_normalise(n);
-	for (int k = 0; k < 3; k++)
-		x[k] = hit->w[0] * corner[0][k] + hit->w[1] * corner[1][k] +
-		       hit->w[2] * corner[2][k];
+	ray_point(w->rays, m, hit->triangle, hit->w, x);
 	return m->surface.material[m->triangle_surface[hit->triangle]];
 }
 

@@ -139,19 +139,6 @@ int pathtrace_misses(const struct pathtrace *p)
 	return p->m->light.n && !p->ways.images.complete;
 }
 
-/* A point of a triangle from its corners, which is closer to the plane than along a ray. */
-static void place(const struct pathtrace *p, size_t triangle, double w[3], double x[3])
-{
-	const uint32_t *c = &p->m->triangle[3 * triangle];
-	const double *corner[3];
-
-	for (int i = 0; i < 3; i++)
-		corner[i] = &p->m->vertex[3 * (size_t)c[i]];
-	ray_clear_of_edges(p->rays, corner, w);
-	for (int k = 0; k < 3; k++)
-		x[k] = w[0] * corner[0][k] + w[1] * corner[1][k] + w[2] * corner[2][k];
-}
-
 int pathtrace_meet(const struct pathtrace *p, const double org[3], const double dir[3],
                    struct vertex *v)
 {
@@ -167,7 +154,7 @@ int pathtrace_meet(const struct pathtrace *p, const double org[3], const double 
 	v->side = v3_dot(v->n, dir) > 0 ? BACK : FRONT;
 	v->t = hit.t;
 	memcpy(v->w, hit.w, sizeof v->w);
-	place(p, hit.triangle, hit.w, v->x);
+	ray_point(p->rays, m, hit.triangle, hit.w, v->x);
 	return 1;
 }
 
@@ -196,7 +183,7 @@ const struct emitter *pathtrace_emitter(const struct pathtrace *p, const double 
 			hi = mid;
 	}
 	double s = sqrt(u[1]), w[3] = { 1 - s, s * (1 - u[2]), s * u[2] };
-	place(p, p->emitter[lo].triangle, w, x);
+	ray_point(p->rays, p->m, p->emitter[lo].triangle, w, x);
 	return &p->emitter[lo];
 }
 

@@ -255,18 +255,20 @@ double ray_inset(const struct ray_scene *s, double area)
 	return fmin(.2, 16 * ray_offset(s) / sqrt(area));
 }
 
-void ray_clear_of_edges(const struct ray_scene *s, const double *const corner[3], double w[3])
+void ray_point(const struct ray_scene *s, const struct model *m, uint32_t triangle,
+               const double weight[3], double x[3])
 {
-	double n[3], sum = 0;
+	const double *corner[3];
+	double n[3], w[3], sum = 0;
 
+	for (int i = 0; i < 3; i++)
+		corner[i] = &m->vertex[3 * (size_t)m->triangle[3 * (size_t)triangle + (size_t)i]];
 	v3_area(corner[0], corner[1], corner[2], n);
 	double least = ray_inset(s, v3_length(n)) / 3;
-	if (w[0] >= least && w[1] >= least && w[2] >= least)
-		return;
 	for (int i = 0; i < 3; i++)
-		sum += w[i] = fmax(w[i], least);
-	for (int i = 0; i < 3; i++)
-		w[i] /= sum;
+		sum += w[i] = fmax(weight[i], least);
+	for (int k = 0; k < 3; k++)
+		x[k] = (w[0] * corner[0][k] + w[1] * corner[1][k] + w[2] * corner[2][k]) / sum;
 }
 
 void ray_nearest(const struct ray_scene *s, const double org[3], const double dir[3],

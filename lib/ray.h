@@ -31,14 +31,15 @@ double ray_offset(const struct ray_scene *s);
 /* Moves point x by ray_offset along n (unit normal of the side a ray leaves). */
 void ray_leave(const struct ray_scene *s, const double n[3], double x[3]);
 
-/* Weights of a triangle's corners, changed where the point is closer to an edge than a few
- * tens of float32 steps of the scene: rays from there may leave between two walls that meet
- * at the edge. */
-void ray_clear_of_edges(const struct ray_scene *s, const double *const corner[3], double w[3]);
-
-/* Part of the way to the centre of a triangle of that area, by which all of it is as clear of
- * its edges. */
+/* Part of the way to the centre of a triangle of that area, by which all of it is clear of its
+ * edges by a few tens of float32 steps of the scene. From closer points rays may leave between
+ * two walls that meet at the edge. */
 double ray_inset(const struct ray_scene *s, double area);
+
+/* A point of an input triangle by weights of its corners, which is closer to the plane than
+ * along a ray, and if need be moved to be as clear of the edges. */
+void ray_point(const struct ray_scene *s, const struct model *m, uint32_t triangle,
+               const double weight[3], double x[3]);
 
 /* Nearest hit of the ray from org along unit dir, any distance > 0. */
 void ray_nearest(const struct ray_scene *s, const double org[3], const double dir[3],
