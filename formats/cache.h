@@ -12,7 +12,7 @@
 /* Part of the key of each stage's output. To be raised whenever a stage makes something
  * else of the same input and options, so that what older programs left is made anew. */
 #define REVISION_MESH "7"
-#define REVISION_FF "16"
+#define REVISION_FF "17"
 #define REVISION_RAD "13"
 #define REVISION_VIEW "10"
 

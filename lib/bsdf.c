@@ -297,3 +297,17 @@ int bsdf_has_ideal(const struct materials *mt, size_t material, int side, int tr
 {
 	return has_finite(mt, material, side, transmitted, 0);
 }
+
+int bsdf_any_pane(const struct materials *mt)
+{
+	for (size_t i = 0; i < 2 * mt->n; i++)
+		if (bsdf_has_ideal(mt, i / 2, (int)(i % 2), 1))
+			return 1;
+	return 0;
+}
+
+int bsdf_emits(const struct materials *mt, size_t material, int side)
+{
+	return !black_side(mt, material, side) &&
+	       band_mean(&mt->emission[material_at(mt, material, side)], mt->bands) > 0;
+}

@@ -68,4 +68,10 @@ double bsdf_albedo(const struct materials *mt, size_t material, int side, int ba
 int bsdf_has_lobe(const struct materials *mt, size_t material, int side, int transmitted);
 int bsdf_has_ideal(const struct materials *mt, size_t material, int side, int transmitted);
 
+/* 1 if any material is a clear pane, for light that comes to either side. */
+int bsdf_any_pane(const struct materials *mt);
+
+/* 1 if the side emits in some band; black backs do not. */
+int bsdf_emits(const struct materials *mt, size_t material, int side);
+
 #endif

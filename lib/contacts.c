@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "boxes.h"
+#include "bsdf.h"
 #include "imprint.h"
 #include "mem.h"
 #include "vec3.h"
@@ -133,14 +134,9 @@ static int clip(const struct search *s, uint32_t a, double end[2][3], int *rim)
 /* Does a triangle give light, on either side? */
 static int emits(const struct model *m, uint32_t triangle)
 {
-	const struct materials *mt = &m->material;
-	const double *l = &mt->emission[material_at(mt, m->surface.material[m->triangle_surface[triangle]],
-	                                            FRONT)];
+	uint32_t material = m->surface.material[m->triangle_surface[triangle]];
 
-	for (int i = 0; i < 2 * mt->bands; i++)
-		if (l[i] > 0)
-			return 1;
-	return 0;
+	return bsdf_emits(&m->material, material, FRONT) || bsdf_emits(&m->material, material, BACK);
 }
 
 /* Notes that triangle b meets the plane of triangle a between p and q. The light that a lamp

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "body_polygons.h"
+#include "bsdf.h"
 #include "facet_set.h"
 #include "vec3.h"
 
@@ -15,16 +16,6 @@ struct maker {
 	struct vec emitter, corner;
 	struct err *e;
 };
-
-static int emits(const struct materials *mt, size_t material, int side)
-{
-	const double *l = &mt->emission[material_at(mt, material, side)];
-
-	for (int b = 0; b < mt->bands && !(side == BACK && mt->one_sided[material]); b++)
-		if (l[b] > 0)
-			return 1;
-	return 0;
-}
 
 static int put_facet(struct maker *k, const struct polygons *p, const uint32_t *corner, int n,
                      size_t material, int side)
@@ -81,7 +72,7 @@ static int put_material(struct maker *k, size_t material, uint32_t *triangle, ui
 	int bad = polygons_init(&p, &sub, k->e);
 	for (size_t i = 0; !bad && i < p.polygon.n; i++)
 		for (int side = FRONT; side <= BACK && !bad; side++)
-			if (emits(&m->material, material, side))
+			if (bsdf_emits(&m->material, material, side))
 				bad = put_polygon(k, &p, (const struct polygon *)p.polygon.data + i, material,
 				                  side);
 	polygons_free(&p);
@@ -110,7 +101,7 @@ int emitters_init(struct emitters *s, const struct model *m, struct err *e)
 	int bad = !triangle || !surface;
 
 	for (size_t i = 0; i < m->material.n && !bad; i++)
-		if (emits(&m->material, i, FRONT) || emits(&m->material, i, BACK))
+		if (bsdf_emits(&m->material, i, FRONT) || bsdf_emits(&m->material, i, BACK))
 			bad = put_material(&k, i, triangle, surface);
 	*s = (struct emitters){ k.emitter.n, k.emitter.data, k.corner.data };
 	if (!bad)

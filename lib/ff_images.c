@@ -29,7 +29,7 @@ static int pass(struct ff_thread *t, const struct ray_hit *hit, struct way *w)
 	                        &t->tally.err);
 	ff_normal(j, locate(&j->locator, hit->triangle, (float)hit->w[1], (float)hit->w[2]),
 	          (int)arrival, n);
-	ff_hit_point(j, hit, w->org);
+	ray_point(j->rays, j->m, hit->triangle, hit->w, w->org);
 	ray_leave(j->rays, n, w->org);
 	return w->chain != CHAIN_NONE;
 }
@@ -82,7 +82,7 @@ uint32_t ff_mirror_way(struct ff_thread *t, const struct mirror_plane *mirror, s
 		uint32_t surface = j->m->triangle_surface[hit.triangle];
 		ff_normal(j, locate(&j->locator, hit.triangle, (float)hit.w[1], (float)hit.w[2]),
 		          hit.side, n);
-		ff_hit_point(j, &hit, x);
+		ray_point(j->rays, j->m, hit.triangle, hit.w, x);
 		if (mirror_has(&j->images.mirrors, mirror, j->m->surface.material[surface], hit.side,
 		               n, x))
 			break;

@@ -198,10 +198,6 @@ void ff_batch_from_element(const struct ff_job *j, const struct ff_samples *s,
 /* Unit normal of a side of an element. */
 void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3]);
 
-/* Where a hit lies, from the triangle's corners, in doubles; clear of its edges by a few
- * float32 steps of the scene, beyond which light would leave through the seam of a corner. */
-void ff_hit_point(const struct ff_job *j, const struct ray_hit *hit, double x[3]);
-
 /* Follows a ray (origin already off its surface) carrying weight w of the row's
  * flux to where it lands, and on through ideal surfaces; tallies everything. */
 void ff_follow(struct ff_thread *t, const double org[3], const double dir[3], double w,

@@ -11,6 +11,7 @@
 #include "bsdf.h"
 #include "ff_job.h"
 #include "light.h"
+#include "solid_angle.h"
 #include "vec3.h"
 
 enum {
@@ -104,30 +105,18 @@ static void look(struct ff_thread *t, struct look *k, uint32_t points)
 	}
 }
 
-/* Solid angle of a triangle from a point off its plane (van Oosterom and Strackee 1983). */
-static double solid_angle(const struct model *m, uint32_t element, const double from[3])
-{
-	double r[3][3], cross[3], length[3];
-
-	for (int c = 0; c < 3; c++) {
-		v3_sub(&m->vertex[3 * (size_t)m->element[3 * (size_t)element + (size_t)c]], from, r[c]);
-		length[c] = v3_length(r[c]);
-	}
-	v3_cross(r[1], r[2], cross);
-	double below = length[0] * length[1] * length[2] + v3_dot(r[0], r[1]) * length[2] +
-	               v3_dot(r[0], r[2]) * length[1] + v3_dot(r[1], r[2]) * length[0];
-	return 2 * atan2(fabs(v3_dot(r[0], cross)), below);
-}
-
 /* Flux on an element of a light of intensity 1 in all directions, nothing between. */
 static double whole_flux(const struct model *m, const struct look *k)
 {
 	uint32_t element = k->column >> 1;
+	double corner[9];
 
 	if (k->l->kind[k->light] == LIGHT_DIRECTIONAL)
 		return m->element_area[element] *
 		       -v3_dot(&k->l->direction[3 * k->light], k->normal);
-	return solid_angle(m, element, &k->l->position[3 * k->light]);
+	for (size_t c = 0; c < 9; c++)
+		corner[c] = m->vertex[3 * (size_t)m->element[3 * (size_t)element + c / 3] + c % 3];
+	return triangle_angle(corner, &k->l->position[3 * k->light]);
 }
 
 /* From summed weights to fractions of the light's flux. */

@@ -33,11 +33,6 @@ static void capture(struct ff_thread *t, uint32_t source, uint32_t chain, double
 		vec_append(&t->captures, &c, 1, sizeof c, &t->tally.err);
 }
 
-void ff_hit_point(const struct ff_job *j, const struct ray_hit *hit, double x[3])
-{
-	ray_point(j->rays, j->m, hit->triangle, hit->w, x);
-}
-
 /* The direction of a flight that goes on by event `slot`, n the normal of the side it
  * leaves; returns the part of its weight that does. */
 static double turn(struct ff_thread *t, uint32_t slot, const double in[3], const double n[3],
@@ -81,7 +76,7 @@ static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_
 		return 0;
 	}
 	ff_normal(t->job, element, transmitted ? !hit->side : hit->side, n);
-	ff_hit_point(t->job, hit, out->org);
+	ray_point(t->job->rays, t->job->m, hit->triangle, hit->w, out->org);
 	double part = turn(t, slot, in->dir, n, out->dir);
 	if (part < 1)
 		tally_rest(&t->tally, chain)->lost += w * (1 - part);

@@ -5,22 +5,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bsdf.h"
 #include "lanes.h"
 #include "light.h"
 #include "mem.h"
 
 /* ---- who is in which ---- */
 
-/* Whether a material gives light on a side that is modelled. */
 static int emits(const struct model *m, uint32_t material)
 {
-	const struct materials *mt = &m->material;
-	size_t at = material_at(mt, material, FRONT), n = (size_t)mt->bands;
-
-	for (size_t k = 0; k < (mt->one_sided[material] ? n : 2 * n); k++)
-		if (mt->emission[at + k] > 0)
-			return 1;
-	return 0;
+	return bsdf_emits(&m->material, material, FRONT) || bsdf_emits(&m->material, material, BACK);
 }
 
 static int shines(const struct model *m, uint32_t light)

@@ -20,9 +20,7 @@ int light_ways_new(const struct model *m, const struct ray_scene *rays, struct l
 {
 	w->m = m;
 	w->rays = rays;
-	w->panes = 0;
-	for (size_t i = 0; i < 2 * m->material.n; i++)
-		w->panes |= bsdf_has_ideal(&m->material, i / 2, (int)(i % 2), 1);
+	w->panes = bsdf_any_pane(&m->material);
 	return light_images_new(m, ray_offset(rays), ORDERS_MOST, IMAGES_MOST, faint, &w->images, e);
 }
 

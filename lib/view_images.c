@@ -13,15 +13,6 @@
 
 /* ---- images ---- */
 
-static int has_panes(const struct model *m)
-{
-	for (size_t i = 0; i < m->material.n; i++)
-		for (int side = 0; side < 2; side++)
-			if (bsdf_has_ideal(&m->material, i, side, 1))
-				return 1;
-	return 0;
-}
-
 /* What a mirror makes of a facet; none if that is behind it. */
 static void turn(const struct facet *f, const struct mirror_plane *k, const double centre[3],
                  double *corner, struct facet *to)
@@ -50,7 +41,7 @@ static int make_images(struct view_images *s, const struct model *m, struct err 
 	if (!s->image || !s->corner)
 		return -1;
 	for (size_t i = 0; i < emitters; i++) {
-		if (has_panes(m))
+		if (bsdf_any_pane(&m->material))
 			s->image[i] = s->emitters.emitter[i].f;
 		for (size_t k = 0; k < s->mirrors.n; k++, used += 3 * FACET_CORNERS)
 			turn(&s->emitters.emitter[i].f, &s->mirrors.plane[k], s->centre, s->corner + used,
@@ -91,16 +82,6 @@ static uint32_t emitter_of(const struct view_images *s, const struct model *m, s
 	return UINT32_MAX;
 }
 
-static int emits(const struct model *m, size_t element, int side)
-{
-	size_t at = material_at(&m->material, model_patch_material(m, m->element_patch[element]), side);
-
-	for (int b = 0; b < m->bands; b++)
-		if (m->material.emission[at + (size_t)b] > 0)
-			return 1;
-	return 0;
-}
-
 int view_images_init(struct view_images *s, const struct model *m, struct err *e)
 {
 	*s = (struct view_images){ .n = 0 };
@@ -108,13 +89,17 @@ int view_images_init(struct view_images *s, const struct model *m, struct err *e
 	if (emitters_init(&s->emitters, m, e) || mirrors_find(m, &s->mirrors, e))
 		return -1;
 	if (s->emitters.n > VIEW_EMITTERS_MOST || s->mirrors.n > VIEW_MIRRORS_MOST ||
-	    (s->mirrors.n == 0 && !has_panes(m)))
+	    (s->mirrors.n == 0 && !bsdf_any_pane(&m->material)))
 		return 0;
 	s->of = mem_new(m->elements, 2 * sizeof *s->of, "images of emitters", e);
 	if (!s->of || make_images(s, m, e))
 		return -1;
-	for (size_t i = 0; i < 2 * m->elements; i++)
-		s->of[i] = emits(m, i / 2, (int)(i % 2)) ? emitter_of(s, m, i / 2, (int)(i % 2)) : UINT32_MAX;
+	for (size_t i = 0; i < 2 * m->elements; i++) {
+		uint32_t material = model_patch_material(m, m->element_patch[i / 2]);
+		int side = (int)(i % 2);
+		s->of[i] = bsdf_emits(&m->material, material, side) ? emitter_of(s, m, i / 2, side)
+		                                                    : UINT32_MAX;
+	}
 	return 0;
 }
 
