@@ -6,11 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../formats/exr_file.h"
-#include "../formats/history.h"
-#include "../lib/compare.h"
-#include "../lib/mem.h"
-#include "common/cli.h"
+#include "formats/container/history.h"
+#include "formats/picture/exr_file.h"
+#include "lib/base/mem.h"
+#include "lib/picture/compare.h"
+#include "tools/common/cli.h"
 
 static const struct cli_option options[] = {
 	{ 'l', "layer", "NAME", "compare the channels of layer NAME only" },

@@ -6,12 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../formats/digest.h"
-#include "../formats/ff_file.h"
-#include "../formats/history.h"
-#include "../formats/mesh_file.h"
-#include "../lib/ff_build.h"
-#include "common/cli.h"
+#include "formats/cache/ff_file.h"
+#include "formats/cache/mesh_file.h"
+#include "formats/container/digest.h"
+#include "formats/container/history.h"
+#include "lib/ff/ff_build.h"
+#include "tools/common/cli.h"
 
 enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GAIN, OPT_GATHER,
        OPT_TO, OPT_CLOSE, OPT_LOBE_DEPTH, OPT_LINKS };

@@ -8,16 +8,16 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "../formats/array_stats.h"
-#include "../formats/ff_file.h"
-#include "../formats/mesh_file.h"
-#include "../formats/npy_file.h"
-#include "../formats/rad_file.h"
-#include "../lib/mem.h"
-#include "../lib/side_table.h"
-#include "../lib/verify.h"
-#include "common/cli.h"
-#include "common/print_ff.h"
+#include "formats/cache/array_stats.h"
+#include "formats/cache/ff_file.h"
+#include "formats/cache/mesh_file.h"
+#include "formats/cache/rad_file.h"
+#include "formats/picture/npy_file.h"
+#include "lib/audit/side_table.h"
+#include "lib/audit/verify.h"
+#include "lib/base/mem.h"
+#include "tools/common/cli.h"
+#include "tools/common/print_ff.h"
 
 enum { SHOWN = 60 };
 

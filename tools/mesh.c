@@ -6,13 +6,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../formats/digest.h"
-#include "../formats/gltf_file.h"
-#include "../formats/history.h"
-#include "../formats/mesh_file.h"
-#include "../formats/rad_file.h"
-#include "../lib/mesher.h"
-#include "common/cli.h"
+#include "formats/cache/mesh_file.h"
+#include "formats/cache/rad_file.h"
+#include "formats/container/digest.h"
+#include "formats/container/history.h"
+#include "formats/gltf/gltf_file.h"
+#include "lib/mesh/mesher.h"
+#include "tools/common/cli.h"
 
 #define FORMAT "twopass.mesh"
 

@@ -6,16 +6,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../formats/atomic_file.h"
-#include "../formats/cache.h"
-#include "../formats/digest.h"
-#include "../formats/exr_file.h"
-#include "../formats/history.h"
-#include "../formats/mesh_file.h"
-#include "../lib/camera.h"
-#include "../lib/mem.h"
-#include "../lib/pathtrace.h"
-#include "common/cli.h"
+#include "formats/cache/cache.h"
+#include "formats/cache/mesh_file.h"
+#include "formats/container/atomic_file.h"
+#include "formats/container/digest.h"
+#include "formats/container/history.h"
+#include "formats/picture/exr_file.h"
+#include "lib/base/mem.h"
+#include "lib/picture/camera.h"
+#include "lib/reference/pathtrace.h"
+#include "tools/common/cli.h"
 
 enum { OPT_SAMPLES = 256, OPT_SEED, OPT_IRRADIANCE, OPT_COMPRESSION, OPT_CENTRE };
 enum { PICTURE_SAMPLES = 64, PARTICLES = 1000000 };

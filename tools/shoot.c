@@ -7,17 +7,17 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "../formats/atomic_file.h"
-#include "../formats/digest.h"
-#include "../formats/ff_file.h"
-#include "../formats/history.h"
-#include "../formats/mesh_file.h"
-#include "../formats/rad_file.h"
-#include "../lib/discretisation.h"
-#include "../lib/light_groups.h"
-#include "../lib/mem.h"
-#include "../lib/radiosity.h"
-#include "common/cli.h"
+#include "formats/cache/ff_file.h"
+#include "formats/cache/mesh_file.h"
+#include "formats/cache/rad_file.h"
+#include "formats/container/atomic_file.h"
+#include "formats/container/digest.h"
+#include "formats/container/history.h"
+#include "lib/base/mem.h"
+#include "lib/interpolate/discretisation.h"
+#include "lib/radiosity/light_groups.h"
+#include "lib/radiosity/radiosity.h"
+#include "tools/common/cli.h"
 
 enum { OPT_RESUME = 256, OPT_LOG, OPT_LIGHT_GROUPS };
 

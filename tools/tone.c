@@ -5,12 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../formats/exr_file.h"
-#include "../formats/history.h"
-#include "../formats/png_file.h"
-#include "../lib/mem.h"
-#include "../lib/tonemap.h"
-#include "common/cli.h"
+#include "formats/container/history.h"
+#include "formats/picture/exr_file.h"
+#include "formats/picture/png_file.h"
+#include "lib/base/mem.h"
+#include "lib/picture/tonemap.h"
+#include "tools/common/cli.h"
 
 enum { OPT_NO_LEGEND = 256, OPT_MIN, OPT_MAX };
 

@@ -6,19 +6,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../formats/atomic_file.h"
-#include "../formats/cache.h"
-#include "../formats/camera_file.h"
-#include "../formats/digest.h"
-#include "../formats/exr_file.h"
-#include "../formats/history.h"
-#include "../formats/rad_file.h"
-#include "../lib/camera.h"
-#include "../lib/light_groups.h"
-#include "../lib/mem.h"
-#include "../lib/view.h"
-#include "common/cli.h"
-#include "common/pattern.h"
+#include "formats/cache/cache.h"
+#include "formats/cache/camera_file.h"
+#include "formats/cache/rad_file.h"
+#include "formats/container/atomic_file.h"
+#include "formats/container/digest.h"
+#include "formats/container/history.h"
+#include "formats/picture/exr_file.h"
+#include "lib/base/mem.h"
+#include "lib/picture/camera.h"
+#include "lib/radiosity/light_groups.h"
+#include "lib/view/view.h"
+#include "tools/common/cli.h"
+#include "tools/common/pattern.h"
 
 enum { OPT_EYE = 256, OPT_TARGET, OPT_UP, OPT_FOV, OPT_SAMPLES, OPT_LOBE_SAMPLES, OPT_DEPTH,
        OPT_CUTOFF, OPT_HALF, OPT_COMPRESSION, OPT_LAYERS, OPT_MIX, OPT_GATHER_RAYS,

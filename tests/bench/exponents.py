@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """A lobe becoming a mirror, exponent by exponent, in both passes: exponents.py
 
-The scene is mirror_virtual_image of tests/data/global_illumination.json with a finite
+The scene is mirror_virtual_image of tests/exact/data/global_illumination.json with a finite
 exponent. Pass 1: irradiance of the receiver, and the same from particles (the
 series phong_to_mirror of the same file). Pass 2: mean radiance of a view of the lobe.
 Both are given as deviations from the mirror, too, and times the exponent, which is
@@ -15,7 +15,8 @@ import tempfile
 import numpy as np
 
 sys.dont_write_bytecode = True
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+sys.path[:0] = [os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", folder)
+                for folder in ("exact", "independent")]
 from chain import DATA, picture, run
 from oracle2gltf import oracles, scene_of
 from oracles import chain_field

@@ -31,7 +31,7 @@ import numpy as np
 
 sys.dont_write_bytecode = True
 HERE = os.path.dirname(os.path.abspath(__file__))
-sys.path[:0] = [HERE, os.path.join(HERE, "..")]
+sys.path[:0] = [HERE, os.path.join(HERE, "..", "exact"), os.path.join(HERE, "..", "independent")]
 from chain import BUILD, Failed, container, form_factors, run
 from cube_factors import cube_factors
 from ff_scenes import make

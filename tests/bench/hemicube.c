@@ -10,10 +10,10 @@
 #include <stdlib.h>
 #include <time.h>
 
-#include "../../formats/mesh_file.h"
-#include "../../lib/hemicube.h"
-#include "../../lib/rng.h"
-#include "../../lib/vec3.h"
+#include "formats/cache/mesh_file.h"
+#include "lib/base/rng.h"
+#include "lib/base/vec3.h"
+#include "lib/hemicube/hemicube.h"
 
 static double seconds(void)
 {

@@ -15,7 +15,8 @@ import tempfile
 import numpy as np
 
 sys.dont_write_bytecode = True
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+sys.path[:0] = [os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", folder)
+                for folder in ("exact", "independent")]
 from chain import run, table
 from oracle2gltf import scene_of
 from oracles import chain_field

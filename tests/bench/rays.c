@@ -18,13 +18,13 @@
 #include <string.h>
 #include <time.h>
 
-#include "../../formats/mesh_file.h"
-#include "../../lib/camera.h"
-#include "../../lib/lobe.h"
-#include "../../lib/mem.h"
-#include "../../lib/par.h"
-#include "../../lib/rng.h"
-#include "../../lib/vec3.h"
+#include "formats/cache/mesh_file.h"
+#include "lib/base/mem.h"
+#include "lib/base/parallel.h"
+#include "lib/base/rng.h"
+#include "lib/base/vec3.h"
+#include "lib/picture/camera.h"
+#include "lib/scatter/lobe.h"
 
 #if defined(__has_include)
 #if __has_include(<embree4/rtcore.h>)

@@ -9,9 +9,9 @@
 #include <stdio.h>
 #include <time.h>
 
-#include "../../lib/exchange.h"
 #include "../unit/brute.h"
 #include "../unit/random_scene.h"
+#include "lib/occlusion/exchange.h"
 
 static double seconds(void)
 {

@@ -72,7 +72,7 @@ prepare ffcalc --to patches "$T/c.mesh" -o "$T/c.ff"
 for row in 0 100 215; do
 	check "row $row: what the reader of ff(5) prints" sh -c "
 	inspect --npy patch-matrix '$T/c.ff' >'$T/c.npy'
-	$PYTHON '$top/tests/read_row.py' '$T/c.ff' $row >'$T/read' && $PYTHON -c '
+	$PYTHON '$top/tests/independent/read_row.py' '$T/c.ff' $row >'$T/read' && $PYTHON -c '
 import sys, numpy as np
 lines = [line.split() for line in open(sys.argv[1])]
 row = np.zeros(216)
@@ -126,7 +126,7 @@ for case, _, expected, got, *_ in lines[1:]:
     assert abs(float(got) - float(expected)) <= 1e-8 * float(expected), (case, expected, got)
 END
 check "to elements: six pairs to 1e-8" sh -c "
-$PYTHON '$top/tests/form_factors.py' -m analytic -o '-n 1024' par_C11_1 par_C13_3 tri_vertex \
+$PYTHON '$top/tests/exact/form_factors.py' -m analytic -o '-n 1024' par_C11_1 par_C13_3 tri_vertex \
 	tri_edge_179deg touching5 far3 | $PYTHON '$T/elements.py'"
 
 # says SCENE OPTIONS PATTERN NAME: the report has a line like the pattern.

@@ -1,3 +1,3 @@
 #!/bin/sh
 # Directional light against particles and the mirror that it becomes.
-exec "${PYTHON:-/usr/bin/python3}" "$(dirname "$0")/../directional.py"
+exec "${PYTHON:-/usr/bin/python3}" "$(dirname "$0")/../exact/directional.py"

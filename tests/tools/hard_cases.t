@@ -1,3 +1,3 @@
 #!/bin/sh
 # Numerically hard inputs.
-exec "${PYTHON:-/usr/bin/python3}" "$(dirname "$0")/../hard_cases.py"
+exec "${PYTHON:-/usr/bin/python3}" "$(dirname "$0")/../exact/hard_cases.py"

@@ -7,11 +7,11 @@ prepare ffcalc "$T/a.mesh" -o "$T/a.ff" -n 4096
 prepare shoot "$T/a.mesh" "$T/a.ff" -o "$T/a.rad"
 
 for kind in mesh ff rad; do
-	check ".$kind and its page agree" $PYTHON "$top/tests/check_formats.py" "$top/man" "$T/a.$kind"
+	check ".$kind and its page agree" $PYTHON "$top/tests/independent/check_formats.py" "$top/man" "$T/a.$kind"
 	check ".$kind: overview" sh -c "inspect '$T/a.$kind' | grep -q '^format *twopass.$kind'"
 	check ".$kind: --verify" inspect --verify "$T/a.$kind"
 	check ".$kind: the reader of mesh(5)" sh -c \
-		"$PYTHON '$top/tests/read_cache.py' '$T/a.$kind' > '$T/read'"
+		"$PYTHON '$top/tests/independent/read_cache.py' '$T/a.$kind' > '$T/read'"
 done
 
 # --json: the same arrays with the same smallest and largest values.
@@ -57,7 +57,7 @@ assert abs(sum(float(l[-1]) for l in lines) - 1) < 1e-12'"
 check "--row: what the reader of ff(5) prints" sh -c "
 inspect --row 0 '$T/a.ff' | grep '^[0-9]*,.*,.*,' | grep -v ',,' |
 	sed 's/,.*:\([fb]\),\([0-9]*\),/ \2 \1 /' > '$T/said' &&
-$PYTHON '$top/tests/read_row.py' '$T/a.ff' 0 > '$T/read' && [ -s '$T/read' ] && $PYTHON -c '
+$PYTHON '$top/tests/independent/read_row.py' '$T/a.ff' 0 > '$T/read' && [ -s '$T/read' ] && $PYTHON -c '
 import sys
 a, b = ([l.split() for l in open(p)] for p in sys.argv[1:])
 assert len(a) == len(b)

@@ -55,7 +55,7 @@ prepare ffcalc -m hemicube -n 8 -p 4 --lobe-rays 64 "$T/a.mesh" -o "$T/c.ff"
 prepare shoot -e .1 "$T/a.mesh" "$T/a.ff" -o "$T/a.rad"
 for file in a.mesh a.ff b.ff c.ff a.rad; do
 	check "mesh.5, ff.5, rad.5: $file has the arrays of its pages" \
-		$PYTHON "$top/tests/check_formats.py" "$top/man" "$T/$file"
+		$PYTHON "$top/tests/independent/check_formats.py" "$top/man" "$T/$file"
 done
 
 # The program in mesh.5, as one would copy it from a terminal.

@@ -1,3 +1,3 @@
 #!/bin/sh
 # The eight exact answers to start with, by both methods.
-exec "${PYTHON:-/usr/bin/python3}" "$(dirname "$0")/../oracles.py" --named
+exec "${PYTHON:-/usr/bin/python3}" "$(dirname "$0")/../exact/oracles.py" --named

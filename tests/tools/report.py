@@ -13,7 +13,8 @@ import numpy as np
 sys.dont_write_bytecode = True
 TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 REPORT = os.path.join(TESTS, "bench", "report")
-sys.path[:0] = [REPORT, TESTS, os.path.join(os.path.dirname(TESTS), "scenes")]
+sys.path[:0] = [REPORT, os.path.join(TESTS, "exact"), os.path.join(TESTS, "independent"),
+                os.path.join(os.path.dirname(TESTS), "scenes")]
 from chain import BUILD, TOP, Tap, picture, run
 from growth import Fit
 from yardstick import Errors, Ladder, Lattice, off

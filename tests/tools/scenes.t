@@ -6,7 +6,7 @@ $PYTHON "$scenes/make_clutter.py" "$T/clutter.gltf"
 $PYTHON "$scenes/make_clutter.py" "$T/clutter.glb"
 check "clutter: the same bytes again" sh -c \
 	"$PYTHON '$scenes/make_clutter.py' '$T/again.gltf' && cmp '$T/again.gltf' '$T/clutter.gltf'"
-check "all files are valid" $PYTHON "$top/tests/validate_gltf.py" \
+check "all files are valid" $PYTHON "$top/tests/gltf/validate_gltf.py" \
 	"$scenes"/*.gltf "$T/clutter.gltf" "$T/clutter.glb"
 grep '# SKIP' "$T/check.out" | sed 's/^/# /' | head -n 1
 triangles=$($PYTHON -c '

@@ -6,7 +6,7 @@ bin=$(cd "$top" && cd "${BUILD:-build}" && pwd) || exit 1
 scenes=$top/scenes
 PYTHON=${PYTHON:-/usr/bin/python3}
 PYTHONDONTWRITEBYTECODE=1
-PYTHONPATH=$top/tests
+PYTHONPATH=$top/tests/exact:$top/tests/independent
 export PYTHONDONTWRITEBYTECODE PYTHONPATH
 T=$(mktemp -d "${TMPDIR:-/tmp}/twopass.XXXXXX") || exit 1
 trap 'cleanup; rm -rf "$T"' EXIT

@@ -8,12 +8,12 @@
 
 #include <cmocka.h>
 
-#include "../../lib/body.h"
-#include "../../lib/exchange.h"
-#include "../../lib/facet_set.h"
-#include "../../lib/seen.h"
-#include "brute.h"
-#include "random_scene.h"
+#include "lib/occlusion/exchange.h"
+#include "lib/occlusion/facet_set.h"
+#include "lib/occlusion/occluder_set.h"
+#include "lib/occlusion/visible_region.h"
+#include "tests/unit/fixtures/brute.h"
+#include "tests/unit/fixtures/random_scene.h"
 
 static void assert_near(double got, double expected, double tolerance)
 {

@@ -8,10 +8,10 @@
 
 #include <cmocka.h>
 
-#include "../../lib/bsdf.h"
-#include "../../lib/lobe.h"
-#include "../../lib/rng.h"
-#include "../../lib/vec3.h"
+#include "lib/base/rng.h"
+#include "lib/base/vec3.h"
+#include "lib/scatter/bsdf.h"
+#include "lib/scatter/lobe.h"
 
 #define COUNT(a) (sizeof(a) / sizeof *(a))
 

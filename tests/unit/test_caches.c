@@ -10,11 +10,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "../../formats/ff_file.h"
-#include "../../formats/mesh_file.h"
-#include "../../formats/rad_file.h"
-#include "../../lib/model_check.h"
-#include "small_scene.h"
+#include "formats/cache/ff_file.h"
+#include "formats/cache/mesh_file.h"
+#include "formats/cache/rad_file.h"
+#include "lib/data/model_check.h"
+#include "tests/unit/fixtures/small_scene.h"
 
 static char directory[] = "/tmp/twopass-caches-XXXXXX";
 static char mesh_path[64], ff_path[64], rad_path[64];
@@ -688,16 +688,16 @@ static void test_python(void **state)
 	const char *files[] = { mesh_path, ff_path, rad_path };
 
 	(void)state;
-	if (access("tests/check_formats.py", R_OK))
+	if (access("tests/independent/check_formats.py", R_OK))
 		skip(); /* not run from the top of the source */
 	write_mesh();
 	write_ff();
 	write_rad();
-	snprintf(command, sizeof command, "/usr/bin/python3 tests/check_formats.py man %s %s %s",
+	snprintf(command, sizeof command, "/usr/bin/python3 tests/independent/check_formats.py man %s %s %s",
 	         files[0], files[1], files[2]);
 	assert_int_equal(system(command), 0);
 	for (int i = 0; i < 3; i++) {
-		snprintf(command, sizeof command, "/usr/bin/python3 tests/read_cache.py %s | "
+		snprintf(command, sizeof command, "/usr/bin/python3 tests/independent/read_cache.py %s | "
 		         "grep '^%s [FU]' > /dev/null", files[i], i == 1 ? "value" : "vertex");
 		assert_int_equal(system(command), 0);
 	}

@@ -8,8 +8,8 @@
 
 #include <cmocka.h>
 
-#include "../../lib/camera.h"
-#include "../../lib/vec3.h"
+#include "lib/base/vec3.h"
+#include "lib/picture/camera.h"
 
 static const double identity[16] = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 };
 

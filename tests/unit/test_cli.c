@@ -9,7 +9,7 @@
 #include <sys/wait.h>
 
 /* The front end of the programs is not in the library. */
-#include "../../tools/common/cli.c"
+#include "tools/common/cli.c"
 
 enum { OPT_SHARE = 256 };
 

@@ -7,8 +7,8 @@
 
 #include <cmocka.h>
 
-#include "../../lib/ff_close.h"
-#include "../../lib/rng.h"
+#include "lib/base/rng.h"
+#include "lib/ff/closure.h"
 
 enum { ROWS = 40, PAIRS = ROWS * (ROWS - 1) / 2 };
 

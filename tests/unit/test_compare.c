@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "../../lib/compare.h"
+#include "lib/picture/compare.h"
 
 static const char *const names[] = { "R", "G", "B" };
 static const int rgb[3] = { 0, 1, 2 }, red[1] = { 0 };

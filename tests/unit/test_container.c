@@ -16,10 +16,10 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "../../formats/cache.h"
-#include "../../formats/container.h"
-#include "../../formats/container_internal.h"
-#include "../../formats/history.h"
+#include "formats/cache/cache.h"
+#include "formats/container/container.h"
+#include "formats/container/container_internal.h"
+#include "formats/container/history.h"
 
 static char directory[] = "/tmp/twopass-container-XXXXXX";
 static char path[64];

@@ -5,10 +5,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "grid.h"
+#include "tests/unit/fixtures/grid.h"
 
-#include "../../lib/direct.h"
-#include "../../lib/vec3.h"
+#include "lib/base/vec3.h"
+#include "lib/occlusion/direct.h"
 
 #define PI 3.14159265358979323846
 

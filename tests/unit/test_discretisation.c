@@ -6,12 +6,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "grid.h"
+#include "tests/unit/fixtures/grid.h"
 
-#include "../../lib/discretisation.h"
-#include "../../lib/reconstruct.h"
-#include "../../lib/rng.h"
-#include "../../lib/vec3.h"
+#include "lib/base/rng.h"
+#include "lib/base/vec3.h"
+#include "lib/interpolate/discretisation.h"
+#include "lib/interpolate/reconstruct.h"
 
 enum { N = 16, SUB = 24 };
 

@@ -14,9 +14,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "../../formats/atomic_file.h"
-#include "../../formats/exr_file.h"
-#include "../../lib/rng.h"
+#include "formats/container/atomic_file.h"
+#include "formats/picture/exr_file.h"
+#include "lib/base/rng.h"
 
 static char directory[] = "/tmp/twopass-exr-XXXXXX";
 

@@ -8,9 +8,9 @@
 
 #include <cmocka.h>
 
-#include "../../lib/ff_job.h"
-#include "memory_ff.h"
-#include "shapes.h"
+#include "lib/ff/ff_job.h"
+#include "tests/unit/fixtures/memory_ff.h"
+#include "tests/unit/fixtures/shapes.h"
 
 #define PI 3.14159265358979323846
 

@@ -1,9 +1,9 @@
 /* glTF files that are good: what the model then holds. */
 #include <math.h>
 
-#include "gltf_files.h"
+#include "tests/unit/fixtures/gltf_files.h"
 
-#include "../../lib/material_rules.h"
+#include "lib/scatter/gltf_to_bsdf.h"
 
 struct scene {
 	struct model m;

@@ -1,5 +1,5 @@
 /* glTF files that are bad: each is refused with its own message, and nothing crashes. */
-#include "gltf_files.h"
+#include "tests/unit/fixtures/gltf_files.h"
 
 struct bad {
 	const char *from, *to; /* edit of base */

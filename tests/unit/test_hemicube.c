@@ -9,9 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../../lib/hemicube.h"
-#include "../../lib/rng.h"
-#include "../../lib/vec3.h"
+#include "lib/base/rng.h"
+#include "lib/base/vec3.h"
+#include "lib/hemicube/hemicube.h"
 
 /* Just enough of a model: vertices and elements. */
 static struct model model_new(size_t vertices, size_t elements)

@@ -8,9 +8,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "../../lib/hemicube.h"
-#include "../../lib/rng.h"
-#include "../../lib/vec3.h"
+#include "lib/base/rng.h"
+#include "lib/base/vec3.h"
+#include "lib/hemicube/hemicube.h"
 
 static void delta_factors_sum_to_one(void **state)
 {

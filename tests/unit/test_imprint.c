@@ -5,9 +5,9 @@
 #include <stdint.h>
 #include <cmocka.h>
 
-#include "../../lib/boxes.h"
-#include "../../lib/imprint.h"
-#include "shapes.h"
+#include "lib/geometry/box_tree.h"
+#include "lib/mesh/imprint.h"
+#include "tests/unit/fixtures/shapes.h"
 
 enum { PLACES = 4 };
 

@@ -8,8 +8,8 @@
 
 #include <cmocka.h>
 
-#include "grid.h"
-#include "solved.h"
+#include "tests/unit/fixtures/grid.h"
+#include "tests/unit/fixtures/solved.h"
 
 static const double zero[3] = { 0, 0, 0 };
 

@@ -8,15 +8,15 @@
 
 #include <cmocka.h>
 
-#include "../../lib/bsdf.h"
-#include "../../lib/direct.h"
-#include "../../lib/light.h"
-#include "../../lib/pathtrace.h"
-#include "../../lib/radiosity.h"
-#include "../../lib/rng.h"
-#include "../../lib/vec3.h"
-#include "grid.h"
-#include "memory_ff.h"
+#include "lib/base/rng.h"
+#include "lib/base/vec3.h"
+#include "lib/data/punctual.h"
+#include "lib/occlusion/direct.h"
+#include "lib/radiosity/radiosity.h"
+#include "lib/reference/pathtrace.h"
+#include "lib/scatter/bsdf.h"
+#include "tests/unit/fixtures/grid.h"
+#include "tests/unit/fixtures/memory_ff.h"
 
 #define PI 3.14159265358979323846
 

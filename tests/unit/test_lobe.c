@@ -7,10 +7,10 @@
 
 #include <cmocka.h>
 
-#include "../../lib/lobe.h"
-#include "../../lib/lobe_table.h"
-#include "../../lib/rng.h"
-#include "../../lib/vec3.h"
+#include "lib/base/rng.h"
+#include "lib/base/vec3.h"
+#include "lib/scatter/lobe.h"
+#include "lib/scatter/lobe_table.h"
 
 static const double pi = 3.14159265358979323846;
 

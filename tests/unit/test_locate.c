@@ -6,8 +6,8 @@
 
 #include <cmocka.h>
 
-#include "../../lib/locate.h"
-#include "shapes.h"
+#include "lib/ray/locate.h"
+#include "tests/unit/fixtures/shapes.h"
 
 /* Every random point is found in the element that the tree gives, or, within float32
  * rounding of an edge, in one that touches the point. */

@@ -7,7 +7,7 @@
 
 #include <time.h>
 
-#include "shapes.h"
+#include "tests/unit/fixtures/shapes.h"
 
 static void test_square(void **state)
 {

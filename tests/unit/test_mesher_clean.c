@@ -5,7 +5,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
-#include "shapes.h"
+#include "tests/unit/fixtures/shapes.h"
 
 static void test_sliver(void **state)
 {

@@ -6,9 +6,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "grid.h"
+#include "tests/unit/fixtures/grid.h"
 
-#include "../../lib/view.h"
+#include "lib/view/view.h"
 
 #define PI 3.14159265358979323846
 

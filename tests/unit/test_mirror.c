@@ -7,9 +7,9 @@
 
 #include <cmocka.h>
 
-#include "../../lib/light_way.h"
-#include "../../lib/vec3.h"
-#include "grid.h"
+#include "lib/base/vec3.h"
+#include "lib/ray/light_visibility.h"
+#include "tests/unit/fixtures/grid.h"
 
 enum { FLOOR, MIRROR, PANE, MATERIALS };
 

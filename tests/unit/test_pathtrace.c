@@ -12,8 +12,8 @@
 
 #include <cmocka.h>
 
-#include "../../lib/pathtrace.h"
-#include "grid.h"
+#include "lib/reference/pathtrace.h"
+#include "tests/unit/fixtures/grid.h"
 
 static const double pi = 3.14159265358979323846;
 static const double sigmas = 4;

@@ -7,9 +7,9 @@
 
 #include <cmocka.h>
 
-#include "../../lib/clear.h"
-#include "../../lib/contour.h"
-#include "polygon_scene.h"
+#include "lib/geometry/contour.h"
+#include "lib/geometry/exchange_unoccluded.h"
+#include "tests/unit/fixtures/polygon_scene.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -38,7 +38,7 @@ static double fraction(int n, const double *a, int k, const double *b)
 
 static void test_point(void **state)
 {
-	/* tests/data/form_factors.json: pt_rect_perp, pt_tri, pt_tri_close. */
+	/* tests/exact/data/form_factors.json: pt_rect_perp, pt_tri, pt_tri_close. */
 	const double up[3] = { 0, 0, 1 }, third = .33333333333333333;
 	const double wall[] = { 0, 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1 };
 	const double tri[] = { 0, 0, 1, 0, 1, 1.5, 1, 0, .7 };
@@ -124,7 +124,7 @@ static void test_perpendicular(void **state)
 			}
 }
 
-/* tests/data/form_factors.json. */
+/* tests/exact/data/form_factors.json. */
 static void test_triangles(void **state)
 {
 	const double right[] = { 0, 0, 0, 1, 0, 0, 0, 1, 0 }, high[] = { 0, 0, 0, 1, 0, 0, .5, 1, 0 };

@@ -9,11 +9,11 @@
 
 #include <unistd.h>
 
-#include "../../formats/ff_file.h"
-#include "../../lib/bsdf.h"
-#include "../../lib/solver.h"
-#include "grid.h"
-#include "solved.h"
+#include "formats/cache/ff_file.h"
+#include "lib/radiosity/shoot.h"
+#include "lib/scatter/bsdf.h"
+#include "tests/unit/fixtures/grid.h"
+#include "tests/unit/fixtures/solved.h"
 
 static const double zero[3] = { 0, 0, 0 }, one[3] = { 1, 1, 1 };
 

@@ -6,11 +6,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "grid.h"
+#include "tests/unit/fixtures/grid.h"
 
-#include "../../lib/reconstruct.h"
-#include "../../lib/rng.h"
-#include "../../lib/vec3.h"
+#include "lib/base/rng.h"
+#include "lib/base/vec3.h"
+#include "lib/interpolate/reconstruct.h"
 
 static const double origin[3] = { 0, 0, 0 }, x1[3] = { 1, 0, 0 }, y1[3] = { 0, 1, 0 };
 

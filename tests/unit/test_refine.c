@@ -5,8 +5,8 @@
 #include <stdint.h>
 #include <cmocka.h>
 
-#include "grid.h"
-#include "shapes.h"
+#include "tests/unit/fixtures/grid.h"
+#include "tests/unit/fixtures/shapes.h"
 
 static const struct mesher_refinement how = { .01, { .02, 0 }, 100000 };
 

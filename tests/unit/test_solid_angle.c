@@ -8,9 +8,9 @@
 
 #include <cmocka.h>
 
-#include "../../lib/rng.h"
-#include "../../lib/solid_angle.h"
-#include "../../lib/vec3.h"
+#include "lib/base/rng.h"
+#include "lib/base/vec3.h"
+#include "lib/geometry/solid_angle.h"
 
 static const double pi = 3.14159265358979323846;
 

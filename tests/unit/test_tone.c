@@ -12,8 +12,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "../../formats/png_file.h"
-#include "../../lib/tonemap.h"
+#include "formats/picture/png_file.h"
+#include "lib/picture/tonemap.h"
 
 static const char *const names[] = { "R", "G", "B" };
 static const int rgb[3] = { 0, 1, 2 };

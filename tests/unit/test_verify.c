@@ -7,10 +7,10 @@
 
 #include <float.h>
 
-#include "../../lib/patch_matrix.h"
-#include "../../lib/side_table.h"
-#include "../../lib/verify.h"
-#include "small_scene.h"
+#include "lib/audit/patch_matrix.h"
+#include "lib/audit/side_table.h"
+#include "lib/audit/verify.h"
+#include "tests/unit/fixtures/small_scene.h"
 
 static const uint8_t sides[] = { 3, 1 };
 

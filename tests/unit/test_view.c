@@ -6,9 +6,9 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#include "stage.h"
+#include "tests/unit/fixtures/stage.h"
 
-#include "../../lib/vec3.h"
+#include "lib/base/vec3.h"
 
 /* A closed box of irradiance 1: diffuse and mirror walls, and across its middle a
  * sheet that does everything. Everything must look 1 / pi bright. */

@@ -7,7 +7,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#include "stage.h"
+#include "tests/unit/fixtures/stage.h"
 
 /* A closed box without emitters, of irradiance 1 that is all indirect. Walls reflect half of
  * what they do not mirror or let through, so that everything is .5 / pi bright, and so is what

@@ -6,11 +6,11 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#include "stage.h"
+#include "tests/unit/fixtures/stage.h"
 
-#include "../../lib/bsdf.h"
-#include "../../lib/lobe.h"
-#include "../../lib/vec3.h"
+#include "lib/base/vec3.h"
+#include "lib/scatter/bsdf.h"
+#include "lib/scatter/lobe.h"
 
 /* Uniform surroundings of radiance 10 seen in a lobe at 60 degrees. */
 static void test_lobes(void **state)

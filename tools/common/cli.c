@@ -1,4 +1,4 @@
-#include "cli.h"
+#include "tools/common/cli.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -14,8 +14,8 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "../../formats/atomic_file.h"
-#include "../../lib/mem.h"
+#include "formats/container/atomic_file.h"
+#include "lib/base/mem.h"
 
 /* Letters of the common options that have no short form: beyond any table's. */
 enum { LETTER_HELP = 100000, LETTER_VERSION };

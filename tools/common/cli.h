@@ -2,8 +2,8 @@
 #ifndef TWOPASS_CLI_H
 #define TWOPASS_CLI_H
 
-#include "../../lib/err.h"
-#include "../../lib/par.h"
+#include "lib/base/err.h"
+#include "lib/base/parallel.h"
 
 #define TWOPASS_VERSION "0.1.0"
 

@@ -1,8 +1,8 @@
-#include "pattern.h"
+#include "tools/common/pattern.h"
 
 #include <string.h>
 
-#include "../../lib/mem.h"
+#include "lib/base/mem.h"
 
 char *pattern_fill(const char *pattern, const char *name, struct err *e)
 {

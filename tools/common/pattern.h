@@ -2,7 +2,7 @@
 #ifndef TWOPASS_PATTERN_H
 #define TWOPASS_PATTERN_H
 
-#include "../../lib/err.h"
+#include "lib/base/err.h"
 
 /* The pattern with each %s replaced by the name; slashes in it become underscores. To be
  * freed. NULL and e when memory is short. */

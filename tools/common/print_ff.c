@@ -1,14 +1,14 @@
-#include "print_ff.h"
+#include "tools/common/print_ff.h"
 
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "../../formats/atomic_file.h"
-#include "../../formats/npy_file.h"
-#include "../../lib/mem.h"
-#include "../../lib/patch_matrix.h"
+#include "formats/container/atomic_file.h"
+#include "formats/picture/npy_file.h"
+#include "lib/audit/patch_matrix.h"
+#include "lib/base/mem.h"
 
 void print_csv(const char *text, const char *after)
 {

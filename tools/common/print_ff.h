@@ -2,7 +2,7 @@
 #ifndef TWOPASS_PRINT_FF_H
 #define TWOPASS_PRINT_FF_H
 
-#include "../../formats/ff_file.h"
+#include "formats/cache/ff_file.h"
 
 /* A field as RFC 4180 has it, with what follows it. */
 void print_csv(const char *text, const char *after);

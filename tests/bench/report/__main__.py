@@ -20,7 +20,8 @@ import time
 sys.dont_write_bytecode = True
 HERE = os.path.dirname(os.path.abspath(__file__))
 TESTS = os.path.dirname(os.path.dirname(HERE))
-sys.path[:0] = [HERE, os.path.dirname(HERE), TESTS, os.path.join(os.path.dirname(TESTS), "scenes")]
+sys.path[:0] = [HERE, os.path.dirname(HERE), os.path.join(TESTS, "exact"),
+                os.path.join(TESTS, "independent"), os.path.join(os.path.dirname(TESTS), "scenes")]
 
 import directional
 import exact

@@ -69,9 +69,9 @@ def oracles(run):
     if not run.plan.oracles:  # but all
         run.bars += oracle_bars(*best)
     yield Title("Exact answers")
-    yield Words("""`tests/oracles.py` on the scenes and tables of
-        `tests/data/global_illumination.json` and the Cornell box by wavelength, by settings
-        chosen for their tolerances (`best`, table `BEST` of `tests/oracle_settings.py`; other
+    yield Words("""`tests/exact/oracles.py` on the scenes and tables of
+        `tests/exact/data/global_illumination.json` and the Cornell box by wavelength, by settings
+        chosen for their tolerances (`best`, table `BEST` of `tests/exact/oracle_settings.py`; other
         methods by its table `CLASSES`). *Of it* is the deviation in parts of the tolerance, and
         so are two standard errors: from the spread of independent runs, whose mean `best` is
         where it samples.""")
@@ -99,8 +99,8 @@ def hard_cases(run):
     run.bars.append(Bar("hard cases behave as stated", "all",
                         f"{len(tried) - len(bad)} of {len(tried)}", not bad))
     yield Title("Hard cases")
-    yield Words(f"""`tests/hard_cases.py`: {len(tried) - len(bad)} of {len(tried)} statements on
-        the scenes of `tests/data/hard_cases.json` hold{', all but these:' if bad else '.'}""")
+    yield Words(f"""`tests/exact/hard_cases.py`: {len(tried) - len(bad)} of {len(tried)} statements on
+        the scenes of `tests/exact/data/hard_cases.json` hold{', all but these:' if bad else '.'}""")
     if bad:
         yield Listing("\n".join(f"{name}: {check}: {'; '.join(notes)}"
                                 for (name, check), notes in bad.items()))

@@ -1,0 +1,61 @@
+/* What the .mesh, .ff and .rad headers have in common, and the ids. */
+#ifndef TWOPASS_CACHE_H
+#define TWOPASS_CACHE_H
+
+#include "formats/container/container.h"
+#include "lib/base/err.h"
+#include "lib/data/model.h"
+
+#define CACHE_VERSION "2"    /* of .mesh and .rad files */
+#define CACHE_FF_VERSION "4" /* of .ff files */
+
+/* Part of the key of each stage's output. To be raised whenever a stage makes something
+ * else of the same input and options, so that what older programs left is made anew. */
+#define REVISION_MESH "7"
+#define REVISION_FF "17"
+#define REVISION_RAD "13"
+#define REVISION_VIEW "10"
+
+/* Strings are owned (malloc) and may be NULL. */
+struct cache_info {
+	char *history;         /* commands, one per line */
+	char *options;         /* the tool's options as a JSON object */
+	char *report;          /* what was modelled, counts, errors, as JSON */
+	char *key;             /* digest of inputs and options: equal keys, equal output */
+	char geometry_id[33];  /* all that form factors depend on */
+	char material_id[33];  /* coefficients, emission, intensities of lights */
+	char camera_id[33];    /* all cameras */
+};
+
+void cache_info_free(struct cache_info *i);
+
+/* Fills the three ids from the model. geometry_id covers vertices, triangles,
+ * elements, split trees, patches, sides modelled, lobe kind, exponents, emission
+ * exponents, which coefficients and emissions are non-zero (in any band), which
+ * directional coefficients are 1 (in all bands), the
+ * assignment of materials to surfaces, kinds, places, directions and cones of lights; not
+ * names, coefficients, intensities, bands, UVs, NORMALs. */
+void cache_ids(const struct model *m, struct cache_info *i);
+
+/* Digest of one camera (32 hex digits). */
+void cache_camera_id(const struct camera *c, char hex[33]);
+
+/* Writes / reads the info as __metadata__ strings, leaving out what is NULL or "".
+ * cache_read_info checks the format's version. */
+int cache_write_info(struct container_writer *w, const char *format,
+                     const struct cache_info *i, struct err *e);
+int cache_read_info(const struct container *c, struct cache_info *i, struct err *e);
+
+/* Lists of names as metadata: a JSON array of strings. The reader wants exactly n
+ * of them; *name is allocated, name by name (cache_names_free). */
+int cache_write_names(struct container_writer *w, const char *key, char *const *name,
+                      size_t n, struct err *e);
+int cache_read_names(const struct container *c, const char *key, char ***name, size_t n,
+                     struct err *e);
+void cache_names_free(char **name, size_t n);
+
+/* 1 if `path` exists, is a whole container of this format (structure and header
+ * digest checked) and its key is `key`: then the file is touched (mtime now). */
+int cache_up_to_date(const char *path, const char *format, const char *key);
+
+#endif

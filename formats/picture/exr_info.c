@@ -1,0 +1,88 @@
+/* The attributes of a picture. */
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "formats/picture/exr_file.h"
+#include "lib/base/mem.h"
+
+static char *copy_string(const char *s, struct err *e)
+{
+	size_t bytes = strlen(s) + 1;
+	char *copy = mem_new(bytes, 1, "a picture's attribute", e);
+
+	return copy ? memcpy(copy, s, bytes) : NULL;
+}
+
+static struct exr_file_string *find(const struct exr_file_info *i, const char *name)
+{
+	for (size_t k = 0; k < i->strings; k++)
+		if (strcmp(i->string[k].name, name) == 0)
+			return &i->string[k];
+	return NULL;
+}
+
+static int append(struct exr_file_info *i, char *name, char *value, struct err *e)
+{
+	struct vec v = { i->string, i->strings, i->strings };
+	struct exr_file_string s = { name, value };
+	int status = vec_append(&v, &s, 1, sizeof s, e);
+
+	i->string = v.data;
+	i->strings = v.n;
+	return status;
+}
+
+int exr_file_info_set(struct exr_file_info *i, const char *name, const char *value,
+                      struct err *e)
+{
+	struct exr_file_string *old = find(i, name);
+	char *v = copy_string(value, e), *n;
+
+	if (!v)
+		return -1;
+	if (old) {
+		free(old->value);
+		old->value = v;
+		return 0;
+	}
+	n = copy_string(name, e);
+	if (n && append(i, n, v, e) == 0)
+		return 0;
+	free(n);
+	free(v);
+	return -1;
+}
+
+const char *exr_file_info_get(const struct exr_file_info *i, const char *name)
+{
+	const struct exr_file_string *s = find(i, name);
+
+	return s ? s->value : NULL;
+}
+
+void exr_file_info_free(struct exr_file_info *i)
+{
+	for (size_t k = 0; k < i->strings; k++) {
+		free(i->string[k].name);
+		free(i->string[k].value);
+	}
+	free(i->string);
+	*i = (struct exr_file_info){ 0 };
+}
+
+int exr_file_up_to_date(const char *path, const char *key)
+{
+	struct exr_file_info info = { 0 };
+	struct err ignored = { 0 };
+	struct stat st;
+
+	if (strcmp(path, "-") == 0 || stat(path, &st) || !S_ISREG(st.st_mode) ||
+	    exr_file_read_info(path, &info, &ignored))
+		return 0;
+	const char *has = exr_file_info_get(&info, EXR_FILE_KEY);
+	int same = has && strcmp(has, key) == 0;
+	exr_file_info_free(&info);
+	return same && utimensat(AT_FDCWD, path, NULL, 0) == 0;
+}

@@ -1,0 +1,171 @@
+/* Form factors, diffuse and directional: what a .ff file holds.
+ *
+ * A ROW is a distribution of flux leaving one patch-side: where it first lands,
+ * and where it lands after each chain of ideal mirrors and clear panes.
+ * Patch-side = 2 patch + side, element-side = 2 element + side. A punctual light is a
+ * source too, numbered behind the patch-sides: 2 patches + light.
+ *
+ * A BLOCK of a row is what arrives by one CHAIN: the multiset of directional events
+ * passed on the way (chain 0: none). Values are colourless fractions of the
+ * row's flux; every block keeps what left the scene (escape), what met a black
+ * back (black), what a reciprocal lobe loses (lost) and what was not followed
+ * further (cut). Light that a surface sends on directionally appears again in the
+ * block of the longer chain, so blocks are not additive: block 0 alone closes,
+ *     row_scale (sum of values + escape + black + lost + cut) = 1,
+ * and the others close against the entries that feed them. Ideal events are followed
+ * in every row, lobes in rows of directional light only: those of emission and of
+ * links. Where a row has no block for light that a lobe sends on, the light goes to a
+ * link.
+ *
+ * A LINK belongs to a patch-side ("target") with a finite lobe and names a
+ * source of light as the target sees it: the patch-sides that the light left (an
+ * emitter by itself, other sources in runs of neighbours that look alike from the
+ * target) and the chain it came by. Its rows are the directional form factors G of
+ * eq. (3) of the paper for light from that source: one about R, one about T. Links
+ * with source FF_ANY stand for a direction bin and serve sources without their own. */
+#ifndef TWOPASS_FF_H
+#define TWOPASS_FF_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "lib/base/err.h"
+#include "lib/data/model.h"
+
+#define FF_ANY UINT32_MAX    /* link_source: no particular one */
+#define FF_NO_ROW UINT32_MAX /* link_row: no such lobe */
+
+enum ff_row_kind {
+	FF_DIFFUSE = 0,     /* Lambertian, one for each patch-side that can shoot */
+	FF_EMISSION = 1,    /* cos^m lobe about the normal (emission_exponent != 1) */
+	FF_REFLECTED = 2,   /* G about R for one link */
+	FF_TRANSMITTED = 3, /* G about T for one link */
+	FF_LIGHT = 4,       /* of a punctual light: of all its flux, see punctual.h */
+	FF_ROW_KINDS
+};
+
+struct ff {
+	/* Chains. Event id = ((2 material + side light arrives on) 2 + T), T = 1
+	 * straight through. Chain c passed events chain_event[i] chain_count[i]
+	 * times (or more, where that is the most that chain.h counts), i in
+	 * [chain_start[c], chain_start[c+1]), ascending. */
+	size_t chains, chain_events;
+	uint64_t *chain_start;
+	uint32_t *chain_event, *chain_count;
+	uint32_t chain_most;      /* where counts of ideal events of a colour stop */
+
+	size_t rows;
+	uint32_t *row_side;       /* patch-side, or light, that the flux leaves */
+	uint8_t *row_kind;
+	uint32_t *row_samples;    /* rays or hemicube pixels spent on block 0, or as many
+	                             independent rays as gathered values are worth to the
+	                             irradiance of elements;
+	                             0: all by formula */
+	double *row_scale;
+	float *row_residual;      /* 1 - sum before scaling (raw closure error) */
+	float *row_error;         /* over receiving patch-sides: the root of the summed squares of
+	                             standard errors; of a row all by formula the sum of the
+	                             estimated errors */
+	uint64_t *row_block;      /* [rows+1] first block */
+
+	size_t blocks;
+	uint32_t *block_chain;    /* chain 0 first, then ascending length */
+	uint64_t *block_start;    /* [blocks+1] first entry */
+	double *block_escape, *block_black, *block_lost, *block_cut;
+	uint64_t *block_arrival;  /* [blocks+1] first arrival */
+
+	/* The columns of a block are a list, a word for each entry, or spans: pairs of
+	 * words (first column, count) that stand for the columns first, first + 2, ...,
+	 * the same side of consecutive elements. Blocks may share words. Columns ascend by
+	 * patch-side, then element. Read them by ff_next. */
+	size_t entries, columns;
+	int to_patches;           /* 0: a column is an element-side, 1: a patch-side */
+	uint64_t *block_column;   /* [blocks] twice the first word, + 1 where spans begin
+	                             there; NULL: all lists, one after the other */
+	uint32_t *column;         /* [columns] words; one of column, column16 is NULL */
+	uint16_t *column16;
+	float *value;             /* one of value, value64 is NULL */
+	double *value64;
+
+	/* Mean direction of light of a block arriving at a patch-side with a lobe:
+	 * unit vector towards where it comes from. */
+	size_t arrivals;
+	uint32_t *arrival_target;
+	float *arrival_direction; /* [arrivals][3] */
+
+	size_t links;
+	uint32_t *link_target;    /* ascending; then by chain, source */
+	uint32_t *link_source;    /* first patch-side, or a light, or FF_ANY */
+	uint32_t *link_last;      /* last patch-side (the same for light), or FF_ANY */
+	uint32_t *link_chain;
+	float *link_direction;    /* [links][3] mean direction to the source */
+	uint32_t *link_row;       /* [links][2] rows about R and T, or FF_NO_ROW */
+
+	/* The shard: patches [patch_begin, patch_end), and as large a part of the lights,
+	 * leave through these rows. */
+	uint32_t patch_begin, patch_end;
+	uint32_t part, parts;     /* K/N, 1-based */
+};
+
+void ff_free(struct ff *f);
+
+static inline double ff_value(const struct ff *f, uint64_t i)
+{
+	return f->value ? (double)f->value[i] : f->value64[i];
+}
+
+static inline uint32_t ff_word(const struct ff *f, uint64_t i)
+{
+	return f->column16 ? f->column16[i] : f->column[i];
+}
+
+static inline uint64_t ff_first_word(const struct ff *f, uint64_t block)
+{
+	return f->block_column ? f->block_column[block] >> 1 : f->block_start[block];
+}
+
+static inline int ff_has_spans(const struct ff *f, uint64_t block)
+{
+	return f->block_column && (f->block_column[block] & 1);
+}
+
+/* Neighbouring entries: columns column, column + 2, ... with values from `entry` on. */
+struct ff_span {
+	uint32_t column, count;
+	uint64_t entry;
+};
+
+/* A block's entries, span by span:
+ *     struct ff_span s;
+ *     for (struct ff_cursor c = ff_begin(f, block); ff_next(&c, &s);)
+ * Lists come in spans too, each as long as it can be. f must have passed ff_check. */
+struct ff_cursor {
+	const struct ff *f;
+	uint64_t word, entry, end; /* end: of the entries */
+	int spans;
+};
+
+static inline struct ff_cursor ff_begin(const struct ff *f, uint64_t block)
+{
+	return (struct ff_cursor){ f, ff_first_word(f, block), f->block_start[block],
+	                           f->block_start[block + 1], ff_has_spans(f, block) };
+}
+
+static inline int ff_next(struct ff_cursor *c, struct ff_span *s)
+{
+	if (c->entry == c->end)
+		return 0;
+	*s = (struct ff_span){ ff_word(c->f, c->word++), 1, c->entry++ };
+	if (c->spans) {
+		s->count = ff_word(c->f, c->word++);
+		c->entry = s->entry + s->count;
+		return 1;
+	}
+	for (; c->entry < c->end && ff_word(c->f, c->word) == s->column + 2 * s->count; c->entry++) {
+		s->count++;
+		c->word++;
+	}
+	return 1;
+}
+
+#endif

@@ -1,0 +1,152 @@
+#include "lib/data/model.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "lib/base/mem.h"
+#include "lib/base/vec3.h"
+#include "lib/data/punctual.h"
+
+uint32_t model_locate(const struct model *m, uint32_t tri, double w[3])
+{
+	int32_t at = m->triangle_split[tri];
+
+	while (at >= 0) {
+		const struct split *s = &m->split[at];
+		int a = s->edge, b = a == 2 ? 0 : a + 1;
+		if (w[a] >= w[b]) {
+			w[a] -= w[b];
+			w[b] *= 2;
+			at = s->child[0];
+		} else {
+			w[b] -= w[a];
+			w[a] *= 2;
+			at = s->child[1];
+		}
+	}
+	return (uint32_t)~at;
+}
+
+int model_derive(struct model *m, struct err *e)
+{
+	m->element_area = mem_new(m->elements, sizeof *m->element_area, "element areas", e);
+	m->element_normal = mem_new(m->elements, 3 * sizeof *m->element_normal,
+	                            "element normals", e);
+	m->element_patch = mem_new(m->elements, sizeof *m->element_patch, "element patches", e);
+	m->patch_area = mem_new(m->patches, sizeof *m->patch_area, "patch areas", e);
+	if (!m->element_area || !m->element_normal || !m->element_patch || !m->patch_area)
+		return -1;
+	for (size_t p = 0; p < m->patches; p++)
+		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++) {
+			const uint32_t *c = &m->element[3 * (size_t)i];
+			double *n = &m->element_normal[3 * (size_t)i];
+			v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
+			        &m->vertex[3 * (size_t)c[2]], n);
+			m->element_area[i] = v3_normalise(n);
+			m->element_patch[i] = (uint32_t)p;
+			m->patch_area[p] += m->element_area[i];
+		}
+	return lights_derive(m, e);
+}
+
+int materials_new(struct materials *mt, size_t n, int bands, struct err *e)
+{
+	size_t nb = 2 * n * (size_t)bands;
+	double **banded[] = { &mt->rho_d, &mt->tau_d, &mt->rho_s, &mt->tau_s, &mt->emission };
+	double **plain[] = { &mt->alpha, &mt->beta, &mt->emission_exponent };
+
+	*mt = (struct materials){ .n = n, .bands = bands };
+	for (size_t i = 0; i < sizeof banded / sizeof *banded; i++)
+		if (!(*banded[i] = mem_new(nb, sizeof(double), "materials", e)))
+			return -1;
+	for (size_t i = 0; i < sizeof plain / sizeof *plain; i++) {
+		if (!(*plain[i] = mem_new(2 * n, sizeof(double), "materials", e)))
+			return -1;
+		for (size_t k = 0; k < 2 * n; k++)
+			(*plain[i])[k] = i < 2 ? (double)INFINITY : 1;
+	}
+	mt->name = mem_new(n, sizeof *mt->name, "material names", e);
+	mt->one_sided = mem_new(n, 1, "materials", e);
+	return mt->name && mt->one_sided ? 0 : -1;
+}
+
+static void free_names(char **name, size_t n)
+{
+	for (size_t i = 0; name && i < n; i++)
+		free(name[i]);
+	free(name);
+}
+
+void materials_free(struct materials *mt)
+{
+	free_names(mt->name, mt->n);
+	free(mt->rho_d);
+	free(mt->tau_d);
+	free(mt->rho_s);
+	free(mt->tau_s);
+	free(mt->alpha);
+	free(mt->beta);
+	free(mt->emission);
+	free(mt->emission_exponent);
+	free(mt->one_sided);
+	*mt = (struct materials){ 0 };
+}
+
+int lights_new(struct lights *l, size_t n, int bands, struct err *e)
+{
+	*l = (struct lights){ .n = n };
+	l->name = mem_new(n, sizeof *l->name, "light names", e);
+	l->kind = mem_new(n, 1, "lights", e);
+	l->position = mem_new(n, 3 * sizeof *l->position, "lights", e);
+	l->direction = mem_new(n, 3 * sizeof *l->direction, "lights", e);
+	l->cone = mem_new(n, 2 * sizeof *l->cone, "lights", e);
+	l->intensity = mem_new(n, (size_t)bands * sizeof *l->intensity, "lights", e);
+	return l->name && l->kind && l->position && l->direction && l->cone && l->intensity
+	           ? 0 : -1;
+}
+
+void lights_free(struct lights *l)
+{
+	free_names(l->name, l->n);
+	free(l->kind);
+	free(l->position);
+	free(l->direction);
+	free(l->cone);
+	free(l->intensity);
+	free(l->unit_flux);
+	free(l->cosine);
+	*l = (struct lights){ 0 };
+}
+
+void model_free(struct model *m)
+{
+	materials_free(&m->material);
+	lights_free(&m->light);
+	free_names(m->surface.name, m->surface.n);
+	free(m->surface.material);
+	free(m->surface.has_normals);
+	for (size_t i = 0; m->camera && i < m->cameras; i++)
+		free(m->camera[i].name);
+	free(m->camera);
+	void *array[] = { m->vertex, m->triangle, m->triangle_surface, m->triangle_uv,
+		m->triangle_normal, m->triangle_split, m->split, m->element,
+		m->element_triangle, m->element_area, m->element_normal, m->element_patch,
+		m->patch_start, m->patch_surface, m->patch_area, m->patch_loop,
+		m->loop_start, m->loop_index };
+	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
+		free(array[i]);
+	*m = (struct model){ 0 };
+}
+
+void model_box(const struct model *m, double lo[3], double hi[3])
+{
+	for (int k = 0; k < 3; k++)
+		lo[k] = INFINITY, hi[k] = -INFINITY;
+	for (size_t i = 0; i < 3 * m->triangles; i++)
+		for (size_t k = 0; k < 3; k++) {
+			double x = m->vertex[3 * (size_t)m->triangle[i] + k];
+			lo[k] = fmin(lo[k], x);
+			hi[k] = fmax(hi[k], x);
+		}
+}

@@ -1,0 +1,114 @@
+#include "lib/data/solution.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "lib/base/channels.h"
+
+double solution_exitance(const struct model *m, const struct solution *s,
+                         size_t element_side, int band)
+{
+	const struct materials *mt = &m->material;
+	uint32_t material = model_patch_material(m, m->element_patch[element_side >> 1]);
+	int side = (int)(element_side & 1);
+	size_t here = material_at(mt, material, side) + (size_t)band;
+	size_t there = material_at(mt, material, !side) + (size_t)band;
+
+	/* A black back gives nothing back and lets nothing through. */
+	if (mt->one_sided[material])
+		return side == BACK ? 0 :
+		       mt->rho_d[here] * solution_irradiance(s, element_side, band);
+	return mt->rho_d[here] * solution_irradiance(s, element_side, band) +
+	       mt->tau_d[there] * solution_irradiance(s, element_side ^ 1, band);
+}
+
+static int check_numbers(const char *name, const double *v, size_t n, int signs,
+                         struct err *e)
+{
+	for (size_t i = 0; i < n; i++)
+		if (!isfinite(v[i]) || (v[i] < 0 && !signs))
+			return err_set(e, "array %s: value %zu is %g", name, i, v[i]);
+	return 0;
+}
+
+int solution_check(const struct model *m, const struct solution *s, struct err *e)
+{
+	size_t bands = (size_t)s->bands, sides = s->element_sides * bands;
+	size_t channels = solution_channels(s);
+
+	if (s->bands != m->bands || s->element_sides != 2 * m->elements ||
+	    s->patch_sides != 2 * m->patches || s->sources != model_sources(m) ||
+	    s->groups < 1)
+		return err_set(e, "array irradiance_direct: it is not that of the model's elements");
+	if (s->groups > CHANNELS_MAX / bands)
+		return err_set(e, "array irradiance_direct: more than %zu light groups",
+		               CHANNELS_MAX / bands);
+	for (size_t i = 0; i < s->emitters; i++)
+		if (s->emitter_group[i] >= s->groups)
+			return err_set(e, "array emitter_group: value %zu is %u", i,
+			               s->emitter_group[i]);
+	return check_numbers("irradiance_direct", s->direct, s->groups * sides, 0, e) ||
+	       check_numbers("irradiance_caustic", s->caustic, s->groups * sides, 0, e) ||
+	       check_numbers("irradiance_indirect", s->indirect, s->groups * sides, 0, e) ||
+	       check_numbers("irradiance_error", s->error, sides, 0, e) ||
+	       check_numbers("irradiance_error_direct", s->error_direct, sides, 0, e) ||
+	       check_numbers("irradiance_discretisation_direct", s->discretisation_direct, sides,
+	                     0, e) ||
+	       check_numbers("irradiance_discretisation", s->discretisation, sides, 0, e) ||
+	       check_numbers("unshot_emission", s->unshot_emission, s->sources * bands, 1,
+	                     e) ||
+	       check_numbers("unshot_diffuse", s->unshot_diffuse, s->patch_sides * channels, 1,
+	                     e) ||
+	       check_numbers("unshot_link", s->unshot_link, 2 * s->links * channels, 1, e) ||
+	       check_numbers("shot", s->shot, 2 * s->rows * channels, 0, e) ||
+	       check_numbers("round", s->round, ROUND_TERMS, 0, e) ||
+	       check_numbers("ledger", s->ledger, LEDGER_TERMS * channels, 1, e) ? -1 : 0;
+}
+
+double solution_mean_error(const struct model *m, const struct solution *s)
+{
+	size_t bands = (size_t)s->bands;
+	double error = 0, all = 0;
+
+	for (size_t es = 0; es < s->element_sides; es++)
+		for (size_t k = 0; k < bands; k++) {
+			double area = m->element_area[es >> 1];
+			error += area * s->error[es * bands + k];
+			all += area * solution_irradiance(s, es, (int)k);
+		}
+	return all > 0 ? error / all : 0;
+}
+
+double solution_relative_rms(const struct model *m, const struct solution *s,
+                             const double *x)
+{
+	size_t bands = (size_t)s->bands;
+	double square = 0, all = 0, area = 0;
+
+	for (size_t es = 0; es < s->element_sides; es++) {
+		double a = m->element_area[es >> 1];
+		if (!model_side_modelled(m, 2 * m->element_patch[es >> 1] + (uint32_t)(es & 1)))
+			continue;
+		for (size_t k = 0; k < bands; k++) {
+			square += a * x[es * bands + k] * x[es * bands + k];
+			all += a * solution_irradiance(s, es, (int)k);
+			area += a;
+		}
+	}
+	return all > 0 ? sqrt(square * area) / all : 0;
+}
+
+void solution_free(struct solution *s)
+{
+	double *array[] = { s->direct, s->caustic, s->indirect, s->error, s->error_direct, s->discretisation,
+		s->discretisation_direct,
+		s->unshot_emission, s->unshot_diffuse, s->unshot_link, s->shot, s->ledger };
+
+	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
+		free(array[i]);
+	for (size_t g = 0; s->group_name && g < s->groups; g++)
+		free(s->group_name[g]);
+	free(s->group_name);
+	free(s->emitter_group);
+	*s = (struct solution){ 0 };
+}

@@ -1,0 +1,181 @@
+/* Batches of rows: put together, chain numbers and links made those of the whole. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "lib/data/link_key.h"
+#include "lib/ff/tally.h"
+
+int batch_begin(struct ff_batch *b, struct err *e)
+{
+	const uint64_t zero = 0;
+
+	/* Start arrays hold ends while a batch grows and a leading 0. */
+	if (b->row_block.n)
+		return 0;
+	return vec_append(&b->row_block, &zero, 1, sizeof zero, e) ||
+	       vec_append(&b->block_start, &zero, 1, sizeof zero, e) ||
+	       vec_append(&b->block_arrival, &zero, 1, sizeof zero, e) ? -1 : 0;
+}
+
+int batch_reserve(struct ff_batch *b, size_t n, struct err *e)
+{
+	return vec_reserve(&b->column, n, sizeof(uint32_t), e) ||
+	       vec_reserve(&b->value, n, b->f64 ? sizeof(double) : sizeof(float), e) ? -1 : 0;
+}
+
+double batch_put_value(struct ff_batch *b, uint32_t column, double w)
+{
+	((uint32_t *)b->column.data)[b->column.n++] = column;
+	if (b->f64)
+		return ((double *)b->value.data)[b->value.n++] = w;
+	return (double)(((float *)b->value.data)[b->value.n++] = (float)w);
+}
+
+double batch_put_values(struct ff_batch *b, const uint32_t *column, const void *x, size_t n,
+                        double scale)
+{
+	uint32_t *to = (uint32_t *)b->column.data + b->column.n;
+	float *narrow = b->f64 ? NULL : (float *)b->value.data + b->value.n;
+	double *wide = b->f64 ? (double *)b->value.data + b->value.n : NULL, sum = 0;
+	size_t k = 0;
+
+	/* Stores first and looks then: no branch to be guessed. */
+	for (size_t j = 0; j < n; j++) {
+		double w = scale * (wide ? ((const double *)x)[j] : (double)((const float *)x)[j]);
+		to[k] = column[j];
+		if (wide)
+			wide[k] = w;
+		else
+			narrow[k] = (float)w;
+		sum += wide ? w : (double)narrow[k];
+		k += w > 0;
+	}
+	b->column.n += k;
+	b->value.n += k;
+	return sum;
+}
+
+int batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *r,
+                    struct err *e)
+{
+	uint64_t entries = b->column.n, arrivals = b->arrival_target.n;
+
+	return vec_append(&b->block_chain, &chain, 1, sizeof chain, e) ||
+	       vec_append(&b->block_start, &entries, 1, sizeof entries, e) ||
+	       vec_append(&b->block_arrival, &arrivals, 1, sizeof arrivals, e) ||
+	       vec_append(&b->escape, &r->escape, 1, sizeof r->escape, e) ||
+	       vec_append(&b->black, &r->black, 1, sizeof r->black, e) ||
+	       vec_append(&b->lost, &r->lost, 1, sizeof r->lost, e) ||
+	       vec_append(&b->cut, &r->cut, 1, sizeof r->cut, e) ? -1 : 0;
+}
+
+int batch_put_row(struct ff_batch *b, const struct batch_row *r, struct err *e)
+{
+	uint64_t blocks = b->block_chain.n;
+	uint8_t kind = (uint8_t)r->kind;
+	float residual = (float)r->residual, error = (float)r->error;
+
+	return vec_append(&b->row_side, &r->side, 1, sizeof r->side, e) ||
+	       vec_append(&b->row_kind, &kind, 1, sizeof kind, e) ||
+	       vec_append(&b->row_samples, &r->samples, 1, sizeof r->samples, e) ||
+	       vec_append(&b->row_scale, &r->scale, 1, sizeof r->scale, e) ||
+	       vec_append(&b->row_residual, &residual, 1, sizeof residual, e) ||
+	       vec_append(&b->row_error, &error, 1, sizeof error, e) ||
+	       vec_append(&b->row_block, &blocks, 1, sizeof blocks, e) ? -1 : 0;
+}
+
+/* ---- the numbers of the whole ---- */
+
+static int map_chain(uint32_t *chain, const struct chains *local, struct vec *map,
+                     struct chains *whole, struct err *e)
+{
+	const uint32_t none = CHAIN_NONE;
+
+	while (map->n < local->n)
+		if (vec_append(map, &none, 1, sizeof none, e))
+			return -1;
+	uint32_t *to = (uint32_t *)map->data + *chain;
+	if (*to == CHAIN_NONE)
+		*to = chains_find(whole, chains_count(local, *chain), e);
+	*chain = *to;
+	return *to == CHAIN_NONE ? -1 : 0;
+}
+
+static int sort_links(struct ff_batch *b, struct err *e)
+{
+	size_t n = b->link_target.n;
+	struct link_key *l = mem_new(n, sizeof *l, "links", e);
+	uint32_t *target = b->link_target.data, *source = b->link_source.data;
+	uint32_t *last = b->link_last.data;
+	uint32_t *chain = b->link_chain.data, *row = b->link_row.data;
+	float *direction = b->link_direction.data;
+
+	if (!l)
+		return -1;
+	for (size_t i = 0; i < n; i++) {
+		l[i] = (struct link_key){ target[i], source[i], last[i], chain[i],
+		                      { row[2 * i], row[2 * i + 1] }, (uint32_t)i, { 0 } };
+		memcpy(l[i].direction, &direction[3 * i], sizeof l[i].direction);
+	}
+	if (n)
+		qsort(l, n, sizeof *l, link_key_order);
+	for (size_t i = 0; i < n; i++) {
+		target[i] = l[i].target;
+		source[i] = l[i].source;
+		last[i] = l[i].last;
+		chain[i] = l[i].chain;
+		memcpy(&row[2 * i], l[i].row, sizeof l[i].row);
+		memcpy(&direction[3 * i], l[i].direction, sizeof l[i].direction);
+	}
+	free(l);
+	return 0;
+}
+
+int batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *map,
+                   struct chains *whole, struct err *e)
+{
+	for (size_t i = 0; i < b->block_chain.n; i++)
+		if (map_chain((uint32_t *)b->block_chain.data + i, local, map, whole, e))
+			return -1;
+	for (size_t i = 0; i < b->link_chain.n; i++)
+		if (map_chain((uint32_t *)b->link_chain.data + i, local, map, whole, e))
+			return -1;
+	return sort_links(b, e);
+}
+
+struct ff batch_view(const struct ff_batch *b)
+{
+	struct ff f = {
+		.rows = b->row_side.n, .row_side = b->row_side.data,
+		.row_kind = b->row_kind.data, .row_samples = b->row_samples.data,
+		.row_scale = b->row_scale.data, .row_residual = b->row_residual.data,
+		.row_error = b->row_error.data, .row_block = b->row_block.data,
+		.blocks = b->block_chain.n, .block_chain = b->block_chain.data,
+		.block_start = b->block_start.data, .block_escape = b->escape.data,
+		.block_black = b->black.data, .block_lost = b->lost.data,
+		.block_cut = b->cut.data, .block_arrival = b->block_arrival.data,
+		.entries = b->column.n, .column = b->column.data,
+		.value = b->f64 ? NULL : b->value.data, .value64 = b->f64 ? b->value.data : NULL,
+		.arrivals = b->arrival_target.n, .arrival_target = b->arrival_target.data,
+		.arrival_direction = b->arrival_direction.data,
+		.links = b->link_target.n, .link_target = b->link_target.data,
+		.link_source = b->link_source.data, .link_last = b->link_last.data,
+		.link_chain = b->link_chain.data,
+		.link_direction = b->link_direction.data, .link_row = b->link_row.data,
+	};
+	return f;
+}
+
+void batch_free(struct ff_batch *b)
+{
+	struct vec *v[] = { &b->row_side, &b->row_kind, &b->row_samples, &b->row_scale,
+		&b->row_residual, &b->row_error, &b->row_block, &b->block_chain,
+		&b->block_start, &b->escape, &b->black, &b->lost, &b->cut, &b->block_arrival,
+		&b->column, &b->value, &b->arrival_target, &b->arrival_direction,
+		&b->link_target, &b->link_source, &b->link_last, &b->link_chain, &b->link_direction,
+		&b->link_row };
+
+	for (size_t i = 0; i < sizeof v / sizeof *v; i++)
+		free(v[i]->data);
+	*b = (struct ff_batch){ .f64 = b->f64 };
+}

@@ -1,0 +1,272 @@
+/* The rows of all patches and lights, in order, and the chain table of the file. */
+#include "lib/ff/ff_build.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "lib/ff/exchange_matrix.h"
+#include "lib/ff/ff_job.h"
+
+enum { PATCHES_AT_A_TIME = 64 };
+
+/* ---- the loop over patches, and then lights ---- */
+
+struct run {
+	const struct ff_job *job;
+	struct ff_thread *thread;
+	struct ff_batch *batch;   /* [PATCHES_AT_A_TIME] */
+	int *owner;               /* thread that made each batch */
+	struct err *err;          /* [PATCHES_AT_A_TIME] */
+	uint32_t first;
+};
+
+static void do_patches(void *arg, size_t begin, size_t end, int thread)
+{
+	struct run *r = arg;
+
+	for (size_t i = begin; i < end; i++) {
+		uint32_t patch = r->first + (uint32_t)i, patches = (uint32_t)r->job->m->patches;
+		r->owner[i] = thread;
+		if (patch >= patches)
+			ff_light_row(&r->thread[thread], patch - patches, &r->batch[i], &r->err[i]);
+		else if (r->job->o.method == FF_HEMICUBE)
+			ff_patch_hemicube(&r->thread[thread], patch, &r->batch[i], &r->err[i]);
+		else
+			ff_patch_rays(&r->thread[thread], patch, &r->batch[i], &r->err[i]);
+	}
+}
+
+void ff_count(struct ff_stats *s, const struct ff *f)
+{
+	for (size_t r = 0; r < f->rows; r++) {
+		double cut = 0;
+		s->rows[f->row_kind[r]]++;
+		s->worst_residual = fmax(s->worst_residual, fabs((double)f->row_residual[r]));
+		for (uint64_t b = f->row_block[r]; b < f->row_block[r + 1]; b++)
+			cut += f->block_cut[b] * f->row_scale[r];
+		s->cut = fmax(s->cut, cut);
+		if (f->row_kind[r] == FF_DIFFUSE) {
+			s->samples += f->row_samples[r];
+			s->mean_error += (double)f->row_error[r];
+			s->worst_error = fmax(s->worst_error, (double)f->row_error[r]);
+		}
+	}
+	s->links += f->links;
+	s->blocks += f->blocks;
+	s->entries += f->entries;
+}
+
+void ff_count_pairs(struct ff_stats *s, const struct exchange_counts *c)
+{
+	s->pairs[0] += c->clear;
+	s->pairs[1] += c->hidden;
+	s->pairs[2] += c->partly;
+	s->pairs[3] += c->crowded;
+	s->evaluations += c->evaluations;
+}
+
+/* Hands the finished batches on, in patch order, with the file's chain numbers. */
+static int emit(struct run *r, size_t n, struct chains *whole, struct ff_stats *stats,
+                const struct ff_sink *sink, struct err *e)
+{
+	int bad = 0;
+
+	for (size_t i = 0; i < n; i++) {
+		struct ff_thread *t = &r->thread[r->owner[i]];
+		struct ff_batch *b = &r->batch[i];
+		if (!bad && r->err[i].set)
+			bad = err_set(e, "%s", r->err[i].text);
+		if (!bad && b->row_side.n) {
+			bad = batch_renumber(b, &t->tally.chains, &t->chain_map, whole, e);
+			struct ff f = batch_view(b);
+			if (!bad)
+				ff_count(stats, &f);
+			bad = bad || sink->put(sink->arg, &f, e);
+		}
+		batch_free(b);
+	}
+	return bad;
+}
+
+struct part_progress {
+	const struct progress *to;
+	double before, total;
+};
+
+static void report(void *arg, double done, double total)
+{
+	struct part_progress *p = arg;
+
+	(void)total;
+	if (p->to && p->to->fn)
+		p->to->fn(p->to->arg, p->before + done, p->total);
+}
+
+/* Before the rows, all elements gather. */
+static int gather(struct ff_job *j, struct ff_stats *stats, const struct progress *progress,
+                  struct err *e)
+{
+	struct part_progress pp = { progress, 0, 2. * (double)j->m->patches };
+	struct progress inner = { report, &pp };
+
+	if (!j->o.gather || j->o.method == FF_HEMICUBE)
+		return 0;
+	return ff_gather(j, &stats->rays, &inner, e) ||
+	       (j->gather.rays && ff_share_rays(j, e)) ? -1 : 0;
+}
+
+/* Patches [begin, end), or lights, numbered behind the patches. */
+static int all_patches(struct run *r, uint32_t begin, uint32_t end, struct chains *whole,
+                       struct ff_stats *stats, const struct ff_sink *sink,
+                       const struct progress *progress, struct err *e)
+{
+	for (uint32_t p = begin; p < end; p += PATCHES_AT_A_TIME) {
+		size_t n = end - p < PATCHES_AT_A_TIME ? end - p : PATCHES_AT_A_TIME;
+		double before = r->job->gather.rays ? (double)r->job->m->patches : 0;
+		struct part_progress pp = { progress, before + p - begin, before + end - begin };
+		struct progress inner = { report, &pp };
+		r->first = p;
+		par_for(n, 1, r->job->o.threads, do_patches, r, &inner);
+		if (emit(r, n, whole, stats, sink, e))
+			return -1;
+	}
+	return 0;
+}
+
+/* Where the k-th of `parts` equal shares of n ends. */
+static uint32_t share(size_t n, uint32_t k, uint32_t parts)
+{
+	return (uint32_t)((uint64_t)n * k / parts);
+}
+
+static int all_lights(struct run *r, struct chains *whole, struct ff_stats *stats,
+                      const struct ff_sink *sink, struct err *e)
+{
+	const struct ff_options *o = &r->job->o;
+	size_t lights = r->job->m->light.n;
+	uint32_t patches = (uint32_t)r->job->m->patches;
+
+	return all_patches(r, patches + share(lights, o->part - 1, o->parts),
+	                   patches + share(lights, o->part, o->parts), whole, stats, sink, NULL, e);
+}
+
+/* ---- the chain table of the file ---- */
+
+static int put_chains(struct ff *f, const struct chains *c, struct err *e)
+{
+	size_t events = 0;
+
+	for (uint32_t i = 0; i < c->n; i++)
+		for (uint32_t k = 0; k < c->events; k++)
+			events += chains_count(c, i)[k] > 0;
+	f->chains = c->n;
+	f->chain_start = mem_new(c->n + 1, sizeof *f->chain_start, "chains", e);
+	f->chain_event = mem_new(events, sizeof *f->chain_event, "chains", e);
+	f->chain_count = mem_new(events, sizeof *f->chain_count, "chains", e);
+	if (!f->chain_start || !f->chain_event || !f->chain_count)
+		return -1;
+	for (uint32_t i = 0; i < c->n; i++) {
+		for (uint32_t k = 0; k < c->events; k++)
+			if (chains_count(c, i)[k]) {
+				f->chain_event[f->chain_events] = c->event[k];
+				f->chain_count[f->chain_events++] = chains_count(c, i)[k];
+			}
+		f->chain_start[i + 1] = f->chain_events;
+	}
+	return 0;
+}
+
+/* What formulas do not do of what was asked of them. */
+static void count_curved(const struct ff_job *j, struct ff_stats *s)
+{
+	const struct model *m = j->m;
+
+	for (uint32_t ps = 0; ps < 2 * m->patches; ps++) {
+		if (!model_side_modelled(m, ps))
+			continue;
+		s->sides++;
+		s->curved += m->patch_loop[(ps >> 1) + 1] == m->patch_loop[ps >> 1];
+		s->directional |= j->is_ideal[ps] || j->has_lobe[ps] || j->shoots_lobe[ps];
+	}
+}
+
+/* All rows, one after the other; without `patches` those of lights only. */
+static int build_rows(struct ff_job *j, int patches, struct ff *whole, struct ff_stats *stats,
+                      const struct ff_sink *sink, const struct progress *progress,
+                      struct err *e)
+{
+	int threads = j->o.threads > 0 ? j->o.threads : 1;
+	struct chains chains = { 0 };
+	struct run run = { .job = j };
+	int bad = ff_job_prepare(j, patches, e) || chains_init(&chains, j->m, j->chain_most, e);
+
+	run.thread = mem_new((size_t)threads, sizeof *run.thread, "threads", e);
+	run.batch = mem_new(PATCHES_AT_A_TIME, sizeof *run.batch, "batches", e);
+	run.owner = mem_new(PATCHES_AT_A_TIME, sizeof *run.owner, "batches", e);
+	run.err = mem_new(PATCHES_AT_A_TIME, sizeof *run.err, "batches", e);
+	bad = bad || !run.thread || !run.batch || !run.owner || !run.err;
+	for (int t = 0; !bad && t < threads; t++)
+		bad = ff_thread_init(&run.thread[t], j, e);
+	for (size_t i = 0; !bad && i < PATCHES_AT_A_TIME; i++)
+		run.batch[i].f64 = j->o.f64;
+	if (patches)
+		bad = bad || gather(j, stats, progress, e) ||
+		      all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats, sink,
+		                  progress, e);
+	bad = bad || all_lights(&run, &chains, stats, sink, e) || put_chains(whole, &chains, e);
+	whole->chain_most = j->chain_most;
+	for (int t = 0; run.thread && t < threads; t++) {
+		stats->rays += run.thread[t].rays;
+		if (run.thread[t].formula)
+			ff_count_pairs(stats, &run.thread[t].formula->counts);
+		ff_thread_free(&run.thread[t]);
+	}
+	free(run.thread);
+	free(run.batch);
+	free(run.owner);
+	free(run.err);
+	chains_free(&chains);
+	return bad ? -1 : 0;
+}
+
+/* The matrix between patches, whose rows have no chains, and the rows of lights. */
+static int build_matrix(struct ff_job *j, struct ff *whole, struct ff_stats *stats,
+                        const struct ff_sink *sink, const struct progress *progress,
+                        struct err *e)
+{
+	if (j->m->light.n)
+		return ff_matrix(j, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
+		       build_rows(j, 0, whole, stats, sink, progress, e) ? -1 : 0;
+	whole->chains = whole->chain_most = 1;
+	whole->chain_start = mem_new(2, sizeof *whole->chain_start, "chains", e);
+	return whole->chain_start ? ff_matrix(j, whole->patch_begin, whole->patch_end, sink, stats,
+	                                      progress, e) : -1;
+}
+
+int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole,
+             struct ff_stats *stats, const struct ff_sink *sink,
+             const struct progress *progress, struct err *e)
+{
+	struct ff_job job;
+	int bad = ff_job_init(&job, m, o, e);
+	int matrix = !bad && ff_by_formula(o) && o->to_patches && ff_matrix_can(&job);
+
+	*stats = (struct ff_stats){ 0 };
+	*whole = (struct ff){ .part = o->part, .parts = o->parts };
+	whole->patch_begin = share(m->patches, o->part - 1, o->parts);
+	whole->patch_end = share(m->patches, o->part, o->parts);
+	if (!bad && o->close && !matrix)
+		bad = err_set(e, "--close needs factors to patches by formula (-m auto --to patches) "
+		              "in a model without lobes, mirrors and panes");
+	if (!bad && ff_by_formula(o))
+		count_curved(&job, stats);
+	if (!bad)
+		bad = matrix ? build_matrix(&job, whole, stats, sink, progress, e)
+		             : build_rows(&job, 1, whole, stats, sink, progress, e);
+	if (o->method == FF_HEMICUBE) /* rows say what they are worth */
+		stats->samples = (double)stats->rows[FF_DIFFUSE] * (double)job.grid.pixels * o->points;
+	if (stats->rows[FF_DIFFUSE])
+		stats->mean_error /= (double)stats->rows[FF_DIFFUSE];
+	ff_job_free(&job);
+	return bad ? -1 : 0;
+}

@@ -1,0 +1,30 @@
+/* Exchange areas of facets with nothing between them: by cubature where both are small for
+ * their distance (one rule for two parallelograms that are very small), by Lambert's formula
+ * over the points of a small one near a large one, by contour integrals for near and touching
+ * ones. */
+#ifndef TWOPASS_EXCHANGE_UNOCCLUDED_H
+#define TWOPASS_EXCHANGE_UNOCCLUDED_H
+
+#include "lib/geometry/cubature.h"
+#include "lib/geometry/cubature_pair.h"
+
+/* Points of a facet that are kept: [CUBATURE_LEVELS], and its joint ones; or NULL. */
+struct clear_points {
+	const struct cubature *level;
+	const struct joint *joint;
+};
+
+/* One thread's scratch space and what accuracy asks for. */
+struct clear {
+	double relative, reach[CUBATURE_LEVELS];
+	double points[2][4][FACET_CORNERS * 18];
+};
+
+/* relative: error of exchange areas. */
+void clear_init(struct clear *c, double relative);
+
+/* Exchange area, m^2, of facets that lie in front of one another. */
+double clear_exchange(struct clear *c, const struct facet *a, struct clear_points pa,
+                      const struct facet *b, struct clear_points pb);
+
+#endif

@@ -1,0 +1,75 @@
+/* Private to the hemicube: triangles in clusters of neighbours, each with vertices
+ * of its own, so that a cluster is transformed once and culled as a whole; a tree
+ * gives an order from near to far. */
+#ifndef TWOPASS_HEMICUBE_SCENE_H
+#define TWOPASS_HEMICUBE_SCENE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "lib/base/err.h"
+#include "lib/data/model.h"
+
+enum { CLUSTER_TRIANGLES = 32, CLUSTER_VERTICES = 3 * CLUSTER_TRIANGLES };
+
+struct hemi_cluster {
+	double centre[3], radius;  /* bounding sphere */
+	size_t vertex;             /* first, a multiple of 4 */
+	size_t triangle;           /* first */
+	int vertices;              /* multiple of 4: the last is repeated */
+	int triangles;
+};
+
+/* A plane between two sets of clusters, by their triangles' centroids. */
+struct hemi_split {
+	double at;
+	int axis;
+	int32_t child[2];          /* below and above: a split, or ~cluster */
+};
+
+struct hemi_mesh {
+	size_t triangles;
+	size_t clusters;
+	struct hemi_cluster *cluster;
+	size_t splits;
+	struct hemi_split *split;
+	int32_t root;              /* as child[]; none where clusters is 0 */
+	double *x, *y, *z;         /* vertices, world */
+	uint8_t (*corner)[4];      /* [triangles] vertices within the cluster, and 0 */
+	uint32_t *number;          /* [triangles] the model's */
+	double horizon;            /* heights up to this are rounding of coordinates */
+};
+
+/* Triangles corner[n][3] of m's vertices. 0, or -1 and e; free either way. */
+int hemi_mesh_init(struct hemi_mesh *s, const struct model *m, const uint32_t *corner, size_t n,
+                   struct err *e);
+void hemi_mesh_free(struct hemi_mesh *s);
+
+/* A model to be drawn by its elements or, where these are many more, by the input
+ * triangles, with the elements found pixel by pixel afterwards. */
+struct hemi_scene {
+	const struct model *m;
+	struct hemi_mesh elements, triangles; /* triangles may be empty */
+};
+
+enum { HEMI_LANES = 8 };
+
+/* A thread's scratch: vertices of one cluster, in the cube's frame and projected
+ * onto one face (in pixels). */
+struct hemi_work {
+	double v[3][CLUSTER_VERTICES];
+	double px[CLUSTER_VERTICES], py[CLUSTER_VERTICES], pq[CLUSTER_VERTICES];
+	int32_t column[CLUSTER_VERTICES], row[CLUSTER_VERTICES];
+	int32_t code[CLUSTER_VERTICES];
+	float *far;                /* least depth in each tile of HEMI_LANES^2 pixels,
+	                              some time ago */
+	size_t drawn;              /* triangles since */
+};
+
+/* Tiles of the top face, and then of each side. */
+static inline size_t hemi_tiles(int n)
+{
+	return (size_t)((n + HEMI_LANES - 1) / HEMI_LANES);
+}
+
+#endif

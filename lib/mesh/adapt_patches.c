@@ -1,0 +1,130 @@
+/* What patches cost by shooting evenly. From afar only their total counts; what is about as
+ * close as the patch is wide sees how it is distributed. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "lib/base/mem.h"
+#include "lib/base/vec3.h"
+#include "lib/geometry/box_tree.h"
+#include "lib/mesh/stages.h"
+
+/* Of the squared deviations in a patch, what arrives at a surface that meets it at a right
+ * angle, as large as itself: the irradiance there is off by half of them at the common edge,
+ * and by hardly anything a patch away. */
+static const double arriving = .1;
+
+/* Closer than so much of its size. */
+static const double reach = .25;
+
+struct search {
+	const struct model *m;
+	struct boxes boxes;
+	double *corner;       /* [2 patches][3] of boxes */
+	uint32_t *triangle;   /* [patches][3] that have these boxes */
+	const struct patch_frame *frame;
+	struct vec found;
+	struct err *e;
+};
+
+struct patch_frame *patch_frames(const struct model *m, struct err *e)
+{
+	struct patch_frame *frame = mem_new(m->patches, sizeof *frame, "patches", e);
+
+	for (uint32_t i = 0; frame && i < m->elements; i++) {
+		uint32_t p = m->element_patch[i];
+		double part = m->element_area[i] / (3 * m->patch_area[p]);
+		for (size_t k = 0; k < 3; k++)
+			v3_mad(frame[p].centre, part, &m->vertex[3 * (size_t)m->element[3 * i + k]],
+			       frame[p].centre);
+		v3_mad(frame[p].normal, m->element_area[i], &m->element_normal[3 * (size_t)i],
+		       frame[p].normal);
+	}
+	for (uint32_t p = 0; frame && p < m->patches; p++)
+		v3_normalise(frame[p].normal);
+	return frame;
+}
+
+static int prepare(struct search *s)
+{
+	const struct model *m = s->m;
+
+	s->corner = mem_new(m->patches, 6 * sizeof *s->corner, "patches", s->e);
+	s->triangle = mem_new(m->patches, 3 * sizeof *s->triangle, "patches", s->e);
+	if (!s->corner || !s->triangle)
+		return -1;
+	for (uint32_t p = 0; p < m->patches; p++) {
+		double *lo = &s->corner[6 * (size_t)p], *hi = lo + 3;
+		for (size_t k = 0; k < 3; k++) {
+			lo[k] = INFINITY, hi[k] = -INFINITY;
+			s->triangle[3 * (size_t)p + k] = 2 * p + (k > 0);
+		}
+		for (size_t i = 3 * (size_t)m->patch_start[p]; i < 3 * (size_t)m->patch_start[p + 1]; i++)
+			for (size_t k = 0; k < 3; k++) {
+				double x = m->vertex[3 * (size_t)m->element[i] + k];
+				lo[k] = fmin(lo[k], x);
+				hi[k] = fmax(hi[k], x);
+			}
+	}
+	return boxes_build(&s->boxes, s->corner, s->triangle, m->patches, s->e);
+}
+
+/* Is any patch that is not in the plane of p, nor behind it, close to the side? -1: e. */
+static int is_close(struct search *s, uint32_t p, int side)
+{
+	double sign = side == FRONT ? 1 : -1, d[3];
+
+	s->found.n = 0;
+	if (boxes_find(&s->boxes, &s->boxes.box[p], reach * sqrt(s->m->patch_area[p]), &s->found,
+	               s->e))
+		return -1;
+	const uint32_t *q = s->found.data;
+	for (size_t i = 0; i < s->found.n; i++) {
+		const struct patch_frame *here = &s->frame[p], *there = &s->frame[q[i]];
+		v3_sub(there->centre, here->centre, d);
+		if (fabs(v3_dot(here->normal, there->normal)) < .9 &&
+		    sign * v3_dot(here->normal, d) > .1 * v3_length(d))
+			return 1;
+	}
+	return 0;
+}
+
+double patch_deviations(const struct model *m, const struct solution *s, uint32_t p, int side)
+{
+	const struct materials *mt = &m->material;
+	size_t here = material_at(mt, model_patch_material(m, p), side), bands = (size_t)m->bands;
+	double all = 0;
+
+	for (size_t k = 0; k < bands; k++) {
+		double sum = 0, square = 0, noise = 0;
+		for (size_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++) {
+			size_t es = 2 * i + (size_t)side;
+			double a = m->element_area[i], x = solution_exitance(m, s, es, (int)k);
+			double error = mt->rho_d[here + k] * s->error[es * bands + k];
+			sum += a * x;
+			square += a * x * x;
+			noise += a * error * error;
+		}
+		all += fmax(0, square - sum * sum / m->patch_area[p] - noise);
+	}
+	return all;
+}
+
+int patch_energies(const struct model *m, const struct solution *s,
+                   const struct patch_frame *frame, double *energy, struct err *e)
+{
+	struct search search = { .m = m, .frame = frame, .e = e };
+	int status = prepare(&search);
+
+	for (uint32_t ps = 0; !status && ps < 2 * m->patches; ps++) {
+		int close = model_side_modelled(m, ps) ? is_close(&search, ps >> 1, (int)(ps & 1)) : 0;
+		status = close < 0 ? -1 : 0;
+		if (close > 0)
+			energy[ps >> 1] += arriving * patch_deviations(m, s, ps >> 1, (int)(ps & 1));
+	}
+	free(search.corner);
+	free(search.triangle);
+	free(search.found.data);
+	boxes_free(&search.boxes);
+	return status;
+}

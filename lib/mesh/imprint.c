@@ -1,0 +1,54 @@
+#include "lib/mesh/imprint.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "lib/mesh/stages.h"
+
+/* Thick: 1e-6 of the scene is far above the rounding of float32 positions and far below
+ * an element. Fractions of the element size: what is much smaller than an element does
+ * not pay for elements of its own, and a gap much narrower shows in none. */
+static struct imprint_limits limits_of(const struct model *m, double size)
+{
+	double lo[3], hi[3], largest = 0, diagonal = 0;
+
+	model_box(m, lo, hi);
+	for (int k = 0; k < 3; k++) {
+		diagonal = hypot(diagonal, hi[k] - lo[k]);
+		largest = fmax(largest, fmax(fabs(lo[k]), fabs(hi[k])));
+	}
+	double thick = fmax(1e-6 * diagonal, 0x1p-48 * largest);
+	return (struct imprint_limits){ .size = size * (1 + 1e-8), .thick = thick,
+		                        .close = fmax(size / 8, thick),
+		                        .apart = fmax(1e-3 * size, 2 * thick),
+		                        .shortest = size / 2, .fine = size / 16 };
+}
+
+int imprint(struct model *m, double size, struct mesher_report *r, struct err *e)
+{
+	struct imprint_limits limits = limits_of(m, size);
+	struct edges g = { 0 };
+	struct contacts contacts = { 0 };
+	struct pieces pieces = { 0 };
+	int status = -1;
+
+	if (!isfinite(size))
+		return 0;
+	if (edges_build(&g, m->triangle, m->triangles, m->vertices, e) ||
+	    find_contacts(m, &g, &limits, &contacts, e))
+		goto done;
+	status = 0;
+	if (contacts.list.n)
+		status = cut_triangles(m, &g, &contacts, &limits, &pieces, e) ||
+		         tear_lines(m, &pieces, &r->lines, e) ? -1 : 0;
+	r->cut = pieces.cut;
+	r->fine_contacts = contacts.fine;
+	if (!status)
+		status = drop_covered(m, &limits, r, e);
+done:
+	edges_free(&g);
+	free(contacts.list.data);
+	free(pieces.vertex.data);
+	free(pieces.piece.data);
+	return status;
+}

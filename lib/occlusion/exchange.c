@@ -1,0 +1,148 @@
+#include "lib/occlusion/exchange.h"
+
+#include <math.h>
+
+#include "lib/base/rng.h"
+#include "lib/base/vec3.h"
+
+enum { CROWD_PARTS = 4 };
+
+void exchanger_init(struct exchanger *x, const struct exchange_options *o,
+                    const struct body_set *bodies, struct ray_scene *rays,
+                    const double centre[3])
+{
+	*x = (struct exchanger){ .o = *o, .bodies = bodies, .rays = rays, .centre = centre };
+	x->sight.most = o->bodies < SIGHT_BLOCKERS ? o->bodies : SIGHT_BLOCKERS;
+	clear_init(&x->clear, o->relative);
+}
+
+void exchanger_free(struct exchanger *x)
+{
+	occluded_free(&x->occluded);
+}
+
+/* ---- too many bodies between: rays between points of both ---- */
+
+static double crowded(struct exchanger *x, const struct facet *a, const struct facet *b,
+                      double clear, uint64_t seed, double *error)
+{
+	double part[CROWD_PARTS], mean = 0, square = 0;
+	uint32_t rays = (uint32_t)x->o.crowd_rays;
+
+	for (uint32_t p = 0; p < CROWD_PARTS; p++) {
+		double seen = 0, all = 0;
+		for (uint32_t i = 0; i < rays / CROWD_PARTS; i++) {
+			double u[4], y[3], z[3], d[3];
+			for (int k = 0; k < 4; k++)
+				u[k] = rng_sobol(i, k, seed + p);
+			facet_point(a, u[0], u[1], y);
+			facet_point(b, u[2], u[3], z);
+			v3_sub(z, y, d);
+			double r2 = v3_dot(d, d);
+			double w = fmax(0, v3_dot(d, a->normal)) * fmax(0, -v3_dot(d, b->normal)) / (r2 * r2);
+			v3_mad(y, 1, x->centre, y);
+			v3_mad(z, 1, x->centre, z);
+			ray_leave(x->rays, a->normal, y);
+			ray_leave(x->rays, b->normal, z);
+			all += w;
+			seen += w > 0 && !ray_blocked(x->rays, y, z) ? w : 0;
+		}
+		part[p] = all > 0 ? seen / all : 0;
+		mean += part[p] / CROWD_PARTS;
+	}
+	for (uint32_t p = 0; p < CROWD_PARTS; p++)
+		square += (part[p] - mean) * (part[p] - mean);
+	*error = clear * (sqrt(square / (CROWD_PARTS * (CROWD_PARTS - 1))) + 1. / rays);
+	return clear * mean;
+}
+
+/* ---- a pair ---- */
+
+/* The part of a facet in front of another's plane. NULL if there is none; *points are
+ * dropped where the facet is cut. */
+static const struct facet *front_part(const struct facet *f, const struct facet *of, double near,
+                                      struct facet_room *room, struct clear_points *points)
+{
+	double lowest, highest, h = v3_dot(of->normal, f->centre) - of->offset;
+
+	if (h >= f->radius)
+		return f;
+	if (h <= -f->radius)
+		return NULL;
+	facet_heights(f, of->normal, of->offset, &lowest, &highest);
+	if (highest <= near)
+		return NULL;
+	if (lowest >= -near)
+		return f;
+	*points = (struct clear_points){ NULL, NULL };
+	return facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
+}
+
+/* Can nothing be between, and is each wholly in front of the other? What most pairs of a
+ * convex scene are. */
+static int plainly_clear(const struct exchanger *x, const struct facet *a, const struct facet *b)
+{
+	return !x->bodies->nodes && v3_dot(b->normal, a->centre) - b->offset >= a->radius &&
+	       v3_dot(a->normal, b->centre) - a->offset >= b->radius;
+}
+
+static double clear_pair(struct exchanger *x, const struct facet *a, struct clear_points pa,
+                         const struct facet *b, struct clear_points pb, double *error)
+{
+	double clear = clear_exchange(&x->clear, a, pa, b, pb);
+
+	*error = x->o.relative * clear;
+	x->counts.clear++;
+	return clear;
+}
+
+static double any_pair(struct exchanger *x, const struct facet_set *sa, uint32_t i,
+                       const struct facet_set *sb, uint32_t j, double *error, struct err *e)
+{
+	struct clear_points pa = { sa->stored[i], &sa->joint[i] };
+	struct clear_points pb = { sb->stored[j], &sb->joint[j] };
+	struct facet_room room[2];
+	double near = x->bodies->near;
+	const struct facet *fa = &sa->facet[i], *fb = &sb->facet[j];
+	const struct facet *a = front_part(fa, fb, near, &room[0], &pa);
+	const struct facet *b = a ? front_part(fb, fa, near, &room[1], &pb) : NULL;
+
+	*error = 0;
+	if (!b)
+		return 0;
+	x->counts.pairs++;
+	enum sight sight = sight_find(&x->sight, x->bodies, a, b);
+	if (sight == SIGHT_NONE) {
+		x->counts.hidden++;
+		return 0;
+	}
+	if (sight == SIGHT_PART) {
+		double before = x->occluded.seer.evaluations;
+		double tolerance = x->o.absolute * fmin(fa->area, fb->area);
+		double sum = occluded_exchange(&x->occluded, &x->clear, &x->sight, tolerance, x->o.most, error, e);
+		x->counts.partly++;
+		x->counts.evaluations += x->occluded.seer.evaluations - before;
+		return sum;
+	}
+	if (sight == SIGHT_CROWDED && !x->o.crowd_rays) {
+		x->counts.crowded++;
+		return 0;
+	}
+	if (sight == SIGHT_CLEAR)
+		return clear_pair(x, a, pa, b, pb, error);
+	double clear = clear_exchange(&x->clear, a, pa, b, pb);
+	x->counts.crowded++;
+	return crowded(x, a, b, clear, ((uint64_t)i << 32) ^ j, error);
+}
+
+double exchange(struct exchanger *x, const struct facet_set *sa, uint32_t i,
+                const struct facet_set *sb, uint32_t j, double *error, struct err *e)
+{
+	const struct facet *a = &sa->facet[i], *b = &sb->facet[j];
+
+	if (!plainly_clear(x, a, b))
+		return any_pair(x, sa, i, sb, j, error, e);
+	x->counts.pairs++;
+	return clear_pair(x, a, (struct clear_points){ sa->stored[i], &sa->joint[i] },
+	                  b, (struct clear_points){ sb->stored[j], &sb->joint[j] }, error);
+}

@@ -1,0 +1,26 @@
+/* Exchange areas of partly hidden facets. One of them is cut along the edges of what the
+ * blockers' shadows can be; cells that see all of the other facet, or nothing, are exact;
+ * over the others what their points see exactly is integrated by adaptive cubature. */
+#ifndef TWOPASS_EXCHANGE_OCCLUDED_H
+#define TWOPASS_EXCHANGE_OCCLUDED_H
+
+#include "lib/base/mem.h"
+#include "lib/geometry/exchange_unoccluded.h"
+#include "lib/occlusion/visible_region.h"
+
+/* One thread's scratch space; begin with {0}, release with occluded_free. */
+struct occluded {
+	struct seer seer;
+	int blockers;
+	struct vec cell;              /* struct cell */
+};
+
+void occluded_free(struct occluded *o);
+
+/* Exchange area, m^2, of the facets of a sight line found SIGHT_PART, to an absolute
+ * error of `tolerance` m^2 if `most` evaluations of what a point sees reach that; the
+ * error estimate goes to *error. NaN and e when memory is short. */
+double occluded_exchange(struct occluded *o, struct clear *clear, const struct sight_line *l,
+                         double tolerance, int most, double *error, struct err *e);
+
+#endif

@@ -1,0 +1,15 @@
+/* What goes on inside convex solids (private to lib/body*.c). */
+#ifndef TWOPASS_OCCLUDER_INSIDE_H
+#define TWOPASS_OCCLUDER_INSIDE_H
+
+#include "lib/occlusion/occluder_solids.h"
+
+enum { INSIDERS = 64 };
+
+/* 1 if a solid may stand for its faces: if what is seen inside it is between places that
+ * are in it as a whole (see sight_find), or nothing. A closed one may hold polygons, or
+ * be crossed by some that see neither it nor one another; an open one is empty, with
+ * black backs. set: see solids_group. O(polygons). */
+int solid_is_opaque(const struct polygons *p, const struct solid *s, const uint32_t *set);
+
+#endif

@@ -1,0 +1,59 @@
+/* What can stand between two facets: the scene's triangles merged into as few convex
+ * bodies as come by cheaply. Connected coplanar triangles with a convex outline are one
+ * flat body; flat bodies that close a convex solid, but for one face at most (a block
+ * without a bottom), are one solid body. Planes that have the whole scene on one side
+ * block nothing and are left out. A solid that something may look out of, or about in,
+ * from a place that is not in it as a whole is left as its faces. */
+#ifndef TWOPASS_OCCLUDER_SET_H
+#define TWOPASS_OCCLUDER_SET_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "lib/base/err.h"
+#include "lib/data/model.h"
+
+/* The most that a body may have: its silhouette then has at most 32 edges. */
+enum { BODY_EDGES = 48, BODY_FACES = 32, FLAT_CORNERS = 32 };
+
+struct plane {
+	double normal[3], offset;     /* normal . x = offset */
+};
+
+/* An edge between two faces; a flat body has only face 0, on both sides. */
+struct body_edge {
+	uint32_t a, b;                /* corners, in body_set.corner */
+	uint16_t left, right;         /* faces of the body */
+	double along[3];              /* unit vector from a to b */
+};
+
+struct body {
+	uint32_t corner, corners;     /* first and number in body_set.corner */
+	uint32_t edge, edges;
+	uint32_t face, faces;
+	int flat;
+	double lo[3], hi[3], centre[3];
+};
+
+struct body_node {
+	double lo[3], hi[3];
+	uint32_t first, count;        /* bodies below */
+	uint32_t right;               /* second child; the first is the next node; 0 = leaf */
+};
+
+/* Corners are relative to facet_centre(). */
+struct body_set {
+	size_t bodies, corners, edges, faces, nodes;
+	struct body *body;            /* ordered as the leaves of the tree */
+	double *corner;               /* [corners][3] */
+	struct body_edge *edge;
+	struct plane *face;           /* outward normals of solids */
+	struct body_node *node;
+	double near;                  /* heights up to this count as on a plane, m */
+};
+
+/* O(n log n) in triangles, and O(corners) for each plane on the hull and each solid. 0, or -1 and e. */
+int body_set_init(struct body_set *s, const struct model *m, struct err *e);
+void body_set_free(struct body_set *s);
+
+#endif

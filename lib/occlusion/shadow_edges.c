@@ -1,0 +1,321 @@
+#include "lib/occlusion/shadow_edges.h"
+
+#include <math.h>
+
+#include "lib/base/vec3.h"
+#include "lib/occlusion/occluder_polygons.h"
+
+/* Up to how many blockers it pays to look for bends, and where the shadows of two meet:
+ * the cells between many are small anyway. */
+enum { FEW = 3 };
+
+/* ---- cuts ---- */
+
+struct cuts {
+	const struct facet *f, *g;
+	double near;
+	int few;                      /* blockers: it pays to look for more than edges */
+	struct shadows *s;
+};
+
+/* +1 if corners are all in front of a plane, -1 if behind, 0 if on both sides. */
+static int side_of(const struct plane *p, const double *x, int n, double near)
+{
+	int above = 0, below = 0;
+
+	for (int i = 0; i < n && !(above && below); i++) {
+		double h = plane_height(p, x + 3 * i);
+		above |= h > near;
+		below |= h < -near;
+	}
+	return above - below;
+}
+
+static int blocker_side(const struct blocker *b, const struct plane *p, double near)
+{
+	return side_of(p, b->corner[0], b->corners, near);
+}
+
+static void add(const struct cuts *c, struct shadow_cuts *s, const struct plane *p, uint64_t of)
+{
+	for (int i = 0; i < s->n; i++)
+		if (fabs(fabs(v3_dot(s->cut[i].normal, p->normal)) - 1) < 1e-12 &&
+		    fabs(fabs(s->cut[i].offset) - fabs(p->offset)) < c->near) {
+			s->of[i] |= of;
+			return;
+		}
+	if (s->n == SHADOW_CUTS)
+		return;
+	s->of[s->n] = of;
+	s->cut[s->n++] = *p;
+}
+
+static void turn_round(struct plane *p)
+{
+	for (int k = 0; k < 3; k++)
+		p->normal[k] = -p->normal[k];
+	p->offset = -p->offset;
+}
+
+/* A plane through an edge of a blocker and a corner of f or g, or the reverse: where it
+ * cuts f, it may end a shadow; where it has the blocker on one side and both facets on the
+ * other, the blocker does nothing. `kink`: the edge has a parallel one. */
+static void consider(struct cuts *c, const struct blocker *b, int number, struct plane *p,
+                     int kink)
+{
+	struct shadows *s = c->s;
+	int of_g = side_of(p, c->g->v, c->g->n, c->near);
+	int of_f = of_g || kink || c->few ? side_of(p, c->f->v, c->f->n, c->near) : 1;
+
+	if (of_f && of_f != of_g)
+		return;
+	int of_b = of_g || c->few ? blocker_side(b, p, c->near) : 0;
+	if (of_f) {
+		s->idle |= (uint64_t)(of_b == -of_f) << number;
+		return;
+	}
+	if (kink || (of_g && of_b))
+		add(c, &s->edges, p, (uint64_t)1 << number);
+	else if (c->few && (of_g || of_b))
+		add(c, &s->bends, p, (uint64_t)1 << number);
+	if (!of_g || of_b != -of_g || s->limits == SHADOW_LIMITS)
+		return;
+	if (of_b < 0)
+		turn_round(p);
+	s->blocker[s->limits] = number;
+	s->limit[s->limits++] = *p;
+}
+
+/* The plane through a and x along a unit vector; 0 if they are in line. */
+static int plane_through(const double a[3], const double along[3], const double x[3], double near,
+                         struct plane *p)
+{
+	double v[3];
+
+	v3_sub(x, a, v);
+	v3_cross(along, v, p->normal);
+	double apart = v3_dot(p->normal, p->normal);
+	if (!(apart > near * near))
+		return 0;
+	apart = 1 / sqrt(apart);
+	for (int k = 0; k < 3; k++)
+		p->normal[k] *= apart;
+	p->offset = v3_dot(p->normal, a);
+	return 1;
+}
+
+/* Of unit vectors. */
+static int parallel(const double a[3], const double b[3])
+{
+	return fabs(v3_dot(a, b)) >= 1 - 5e-13;
+}
+
+/* Bits of a blocker's faces that a point is surely in front of, and behind. */
+struct faces {
+	uint64_t front, behind;
+};
+
+static struct faces faces_from(const struct blocker *b, const double x[3], double near)
+{
+	struct faces f = { 0, 0 };
+
+	for (int i = 0; i <= b->faces; i++) {
+		double h = plane_height(&b->face[i], x);
+		f.front |= (uint64_t)(h > near) << i;
+		f.behind |= (uint64_t)(h < -near) << i;
+	}
+	return f;
+}
+
+/* Is an edge inside the blocker's silhouette as seen from a point? So it is, then, for
+ * all that see it in line with that point. */
+static int within(const struct blocker *b, int edge, struct faces f)
+{
+	uint64_t both = (uint64_t)1 << b->edge[edge].left | (uint64_t)1 << b->edge[edge].right;
+
+	return !b->flat && ((f.front & both) == both || (f.behind & both) == both);
+}
+
+/* Does a face of the blocker have both facets in front of it, or an edge's plane through a
+ * corner of f the blocker on one side and them on the other? */
+static void find_idle(struct cuts *c, const struct blocker *b, int number)
+{
+	struct plane p;
+
+	for (int i = 0; i < b->faces; i++) {
+		int of_f = side_of(&b->face[i], c->f->v, c->f->n, c->near);
+		int of_g = side_of(&b->face[i], c->g->v, c->g->n, c->near);
+		if (of_f && of_g == of_f && (b->flat || of_f > 0))
+			c->s->idle |= (uint64_t)1 << number;
+		else if (!of_f && (b->flat || !of_g))
+			add(c, &c->s->edges, &b->face[i], (uint64_t)1 << number);
+	}
+	for (int j = 0; j < c->f->n; j++) {
+		struct faces of_x = faces_from(b, &c->f->v[3 * j], c->near);
+		for (int i = 0; i < b->edges && !(c->s->idle >> number & 1); i++)
+			if (!within(b, i, of_x) &&
+			    plane_through(b->edge[i].a, b->edge[i].along, &c->f->v[3 * j], c->near, &p) &&
+			    side_of(&p, c->f->v, c->f->n, c->near))
+				consider(c, b, number, &p, 0);
+	}
+}
+
+/* The corners of a blocker that are first and last as a plane turns about an edge of g, from
+ * its outside to its inside. */
+static void first_and_last(const struct cuts *c, const struct blocker *b, int edge,
+                           const double along[3], int found[2])
+{
+	double outwards[3], d[3], first[2] = { -1, 0 }, last[2] = { 1, 0 };
+
+	found[0] = found[1] = 0;
+	v3_cross(along, c->g->normal, outwards);
+	for (int i = 0; i < b->corners; i++) {
+		v3_sub(b->corner[i], &c->g->v[3 * edge], d);
+		double x = v3_dot(outwards, d), y = fmax(0, v3_dot(c->g->normal, d));
+		if (x * first[1] - y * first[0] > 0 || i == 0) {
+			first[0] = x, first[1] = y;
+			found[0] = i;
+		}
+		if (x * last[1] - y * last[0] < 0 || i == 0) {
+			last[0] = x, last[1] = y;
+			found[1] = i;
+		}
+	}
+}
+
+/* Planes through an edge of g and corners of a blocker: those that have it on one side, or
+ * all. */
+static void corner_cuts(struct cuts *c, const struct blocker *b, int number, int edge,
+                        const double along[3])
+{
+	const double *from = &c->g->v[3 * edge];
+	int found[2];
+	struct plane p;
+
+	if (c->few) {
+		for (int i = 0; i < b->corners && !(c->s->idle >> number & 1); i++)
+			if (plane_through(from, along, b->corner[i], c->near, &p))
+				consider(c, b, number, &p, 0);
+		return;
+	}
+	first_and_last(c, b, edge, along, found);
+	for (int i = 0; i < 2 && !(c->s->idle >> number & 1); i++)
+		if (plane_through(from, along, b->corner[found[i]], c->near, &p))
+			consider(c, b, number, &p, 0);
+}
+
+static void blocker_cuts(struct cuts *c, const struct blocker *b, int number)
+{
+	const struct facet *g = c->g;
+	double along[3];
+	struct plane p;
+
+	for (int j = 0; j < g->n && !(c->s->idle >> number & 1); j++) {
+		const double *v = &g->v[3 * j], *next = &g->v[3 * ((j + 1) % g->n)];
+		struct faces of_x = faces_from(b, v, c->near);
+		v3_sub(next, v, along);
+		v3_normalise(along);
+		for (int i = 0; i < b->edges && !(c->s->idle >> number & 1); i++)
+			if (!within(b, i, of_x) &&
+			    plane_through(b->edge[i].a, b->edge[i].along, v, c->near, &p))
+				consider(c, b, number, &p, parallel(b->edge[i].along, along));
+		corner_cuts(c, b, number, j, along);
+	}
+}
+
+/* Planes through parallel edges of two blockers with one on each side: the gap between them
+ * opens there. */
+static void gap_cuts(struct cuts *c, const struct blocker *a, const struct blocker *b, uint64_t of)
+{
+	struct plane p;
+
+	for (int j = 0; j < b->edges; j++) {
+		struct faces of_x = faces_from(a, b->edge[j].a, c->near);
+		for (int i = 0; i < a->edges; i++)
+			if (parallel(a->edge[i].along, b->edge[j].along) && !within(a, i, of_x) &&
+			    plane_through(a->edge[i].a, a->edge[i].along, b->edge[j].a, c->near, &p) &&
+			    !side_of(&p, c->f->v, c->f->n, c->near) &&
+			    blocker_side(a, &p, c->near) * blocker_side(b, &p, c->near) < 0)
+				add(c, &c->s->edges, &p, of);
+	}
+}
+
+/* Planes through an edge of one blocker and a corner of another with each on one side:
+ * their shadows meet there, or part. */
+static void meeting_cuts(struct cuts *c, const struct blocker *a, const struct blocker *b,
+                         uint64_t of)
+{
+	struct plane p;
+
+	for (int j = 0; j < b->corners; j++) {
+		struct faces of_x = faces_from(a, b->corner[j], c->near);
+		for (int i = 0; i < a->edges; i++) {
+			if (within(a, i, of_x) ||
+			    !plane_through(a->edge[i].a, a->edge[i].along, b->corner[j], c->near, &p) ||
+			    side_of(&p, c->f->v, c->f->n, c->near))
+				continue;
+			int side = blocker_side(a, &p, c->near);
+			side *= side ? blocker_side(b, &p, c->near) : 0;
+			if (side)
+				add(c, side < 0 ? &c->s->edges : &c->s->bends, &p, of);
+		}
+	}
+}
+
+void shadow_edges(const struct blocker *b, int blockers, const struct facet *f,
+                  const struct facet *g, double near, struct shadows *s)
+{
+	struct cuts c = { f, g, near, blockers <= FEW, s };
+
+	s->edges.n = s->bends.n = s->limits = 0;
+	s->idle = 0;
+	for (int i = 0; i < blockers; i++) {
+		find_idle(&c, &b[i], i);
+		blocker_cuts(&c, &b[i], i);
+	}
+	for (int i = 0; i < blockers && s->edges.n < SHADOW_CUTS; i++)
+		for (int j = 0; j < i; j++)
+			gap_cuts(&c, &b[i], &b[j], (uint64_t)1 << i | (uint64_t)1 << j);
+	for (int i = 0; c.few && i < blockers; i++)
+		for (int j = 0; j < blockers; j++)
+			if (j != i)
+				meeting_cuts(&c, &b[i], &b[j], (uint64_t)1 << i | (uint64_t)1 << j);
+}
+
+/* ---- cells ---- */
+
+/* Is the blocker beyond one of the planes that hold both facets behind them? */
+static int outside(const struct blocker *b, const struct plane *shaft, int planes, double near)
+{
+	for (int p = 0; p < planes; p++) {
+		int i = 0;
+		while (i < b->corners && plane_height(&shaft[p], b->corner[i]) >= -near)
+			i++;
+		if (i == b->corners)
+			return 1;
+	}
+	return 0;
+}
+
+uint64_t shadow_on(const struct blocker *b, const struct shadows *s, uint64_t from,
+                   const struct facet *cell, const struct facet *g, double near, int *hidden)
+{
+	struct plane shaft[SHAFT_PLANES];
+	uint64_t left = from;
+
+	*hidden = 0;
+	for (int i = 0; i < s->limits; i++)
+		if (left >> s->blocker[i] & 1 &&
+		    side_of(&s->limit[i], cell->v, cell->n, near) < 0)
+			left &= ~((uint64_t)1 << s->blocker[i]);
+	/* Where the limits of shadows are known they say as much. */
+	int planes = left && !s->limits ? shaft_planes(cell, g, near, shaft) : 0;
+	for (uint64_t i = left; i; i &= i - 1) {
+		int k = __builtin_ctzll(i);
+		if (outside(&b[k], shaft, planes, near))
+			left &= ~((uint64_t)1 << k);
+		else if ((*hidden = blocker_hides(&b[k], cell, g, near)))
+			return left;
+	}
+	return left;
+}

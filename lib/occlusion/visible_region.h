@@ -1,0 +1,57 @@
+/* What a point sees of a facet past blockers. */
+#ifndef TWOPASS_VISIBLE_REGION_H
+#define TWOPASS_VISIBLE_REGION_H
+
+#include "lib/base/err.h"
+#include "lib/geometry/point_polygon.h"
+#include "lib/occlusion/shaft.h"
+
+enum { OUTLINE_EDGES = 64 };
+
+/* The silhouette of a blocker for all eyes that have the same of its faces in front. */
+struct outline {
+	uint64_t front;               /* bits of those faces; 0: not known */
+	int edges;
+	double a[3][OUTLINE_EDGES];   /* by coordinate: a corner of each edge */
+	double d[3][OUTLINE_EDGES];   /* along it, (a - eye) x d to the inside */
+};
+
+/* Planes through the eye and the edges of an outline, their normals to the inside. */
+struct outline_planes {
+	double x[OUTLINE_EDGES], y[OUTLINE_EDGES], z[OUTLINE_EDGES];
+	double size[OUTLINE_EDGES];   /* of the factors of each normal */
+};
+
+/* Something additive of polygons that an eye sees. */
+typedef double (*seen_measure)(const struct eye_polygon *p, void *arg);
+
+/* One thread's scratch space and the blockers. */
+struct seer {
+	struct blocker blocker[SIGHT_BLOCKERS];
+	double near;                  /* of the body set */
+	int hid;                      /* set when a blocker hides something */
+	double evaluations;           /* so far */
+	/* The eye in work. */
+	double reach;                 /* of the farthest corner of what is looked at */
+	seen_measure measure;
+	void *arg;
+	int overlaps;                 /* see visible_region.c */
+	int full;                     /* a polygon has too many corners */
+	struct outline outline[SIGHT_BLOCKERS];
+	struct outline_planes planes[SIGHT_BLOCKERS];
+};
+
+/* To be called when blockers have changed. */
+void seer_begin(struct seer *s, int blockers, double near);
+
+/* The form factor from a point x with a unit normal to what it sees of facet g, which is
+ * in front of it; exact. blockers: a bit for each that may hide something. NaN and e when
+ * polygons have too many corners. */
+double seen(struct seer *s, const double x[3], const double normal[3], const struct facet *g,
+            uint64_t blockers, struct err *e);
+
+/* The same for any measure: its sum over convex polygons that are together what is seen. */
+double seen_measured(struct seer *s, const double x[3], const struct facet *g, uint64_t blockers,
+                     seen_measure measure, void *arg, struct err *e);
+
+#endif

@@ -1,0 +1,420 @@
+/* The pass over elements: irradiance from the flux that every row has sent.
+ *
+ * Threads own ranges of receivers, so sums do not depend on their number; each reads
+ * only the entries that land in its range. */
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "lib/base/channels.h"
+#include "lib/base/parallel.h"
+#include "lib/radiosity/propagate.h"
+#include "lib/radiosity/radiosity.h"
+#include "lib/scatter/bsdf.h"
+
+/* Feeds whose entries are on the way from memory. */
+enum { AHEAD = 8 };
+
+enum part { DIRECT, CAUSTIC, INDIRECT, H_PARTS };
+
+/* A block that carries flux: what it adds to every receiver it lands on, per unit of
+ * value. */
+struct feed {
+	lanes fresh, mixed;
+	lanes_f32 variance;
+	const struct ff *f;
+	uint64_t block;              /* of f */
+	uint8_t to_fresh, carries;   /* enum part; bit 0: fresh flux, bit 1: mixed */
+};
+
+/* Where a feed's entries in a range begin. */
+struct place {
+	uint64_t word, entry;        /* of f */
+	uint32_t done;               /* entries of the span that begins there */
+};
+
+struct gather {
+	const struct transport *t;
+	struct solution *s;
+	int to_patches;
+	size_t receivers;            /* elements or patches, 2 sides each */
+	const double *block_flux[2]; /* [blocks][channels] by freshness, over the block's sum */
+	size_t ranges;               /* one a thread */
+	uint32_t *cut;               /* [ranges+1] receivers */
+	size_t feeds;
+	struct feed *feed;
+	lanes *flux[H_PARTS];        /* [2][receivers] by side: landing flux */
+	lanes_f32 *variance[2];      /* [2][receivers], in units of `unit`: of rows that bring
+	                                direct light, and of others */
+	double unit;                 /* the largest that a whole block adds */
+	size_t channels;
+	size_t first;                /* channel of the four in work */
+	double bytes;
+};
+
+/* ---- a block into a range ---- */
+
+/* Where a feed adds. */
+struct into {
+	lanes *fresh, *mixed;
+	lanes_f32 *variance;
+};
+
+static ALWAYS_INLINE void add(const struct feed *x, const struct into *to, size_t at,
+                              double v, int fresh, int mixed)
+{
+	if (fresh)
+		to->fresh[at] += x->fresh * v;
+	if (mixed)
+		to->mixed[at] += x->mixed * v;
+	to->variance[at] += x->variance * (float)v;
+}
+
+/* A feed's entries from p on that lie below a receiver. Inlined with constants, so
+ * that each case is a loop of its own. */
+static ALWAYS_INLINE void add_list(const struct gather *g, const struct feed *x,
+                                   const struct into *to, struct place p, uint32_t below,
+                                   int f32, int fresh, int mixed)
+{
+	const struct ff *f = x->f;
+	const uint64_t n = f->block_start[x->block + 1] - p.entry;
+
+	for (uint64_t i = 0; i < n; i++) {
+		uint32_t column = ff_word(f, p.word + i);
+		if (column >> 1 >= below)
+			break;
+		size_t at = (column >> 1) + (column & 1 ? g->receivers : 0);
+		double v = f32 ? (double)f->value[p.entry + i] : f->value64[p.entry + i];
+		add(x, to, at, v, fresh, mixed);
+	}
+}
+
+static ALWAYS_INLINE void add_spans(const struct gather *g, const struct feed *x,
+                                    const struct into *to, struct place p, uint32_t below,
+                                    int f32, int fresh, int mixed)
+{
+	const struct ff *f = x->f;
+	const uint64_t end = f->block_start[x->block + 1];
+
+	for (int cut = 0; p.entry < end && !cut; p.word += 2, p.done = 0) {
+		uint32_t column = ff_word(f, p.word), first = (column >> 1) + p.done;
+		uint32_t last = first + ff_word(f, p.word + 1) - p.done;
+		size_t back = column & 1 ? g->receivers : 0;
+		if (first >= below)
+			break;
+		cut = last > below;
+		if (cut)
+			last = below;
+		for (size_t at = first + back; at < last + back; at++, p.entry++) {
+			double v = f32 ? (double)f->value[p.entry] : f->value64[p.entry];
+			add(x, to, at, v, fresh, mixed);
+		}
+	}
+}
+
+static ALWAYS_INLINE void add_as(const struct gather *g, const struct feed *x,
+                                 const struct into *to, struct place p, uint32_t below,
+                                 int f32, int fresh, int mixed)
+{
+	if (ff_has_spans(x->f, x->block))
+		add_spans(g, x, to, p, below, f32, fresh, mixed);
+	else
+		add_list(g, x, to, p, below, f32, fresh, mixed);
+}
+
+static void add_feed(const struct gather *g, const struct feed *x, struct place p,
+                     uint32_t below)
+{
+	const struct into to = { g->flux[x->to_fresh], g->flux[INDIRECT],
+		                 g->variance[x->to_fresh != DIRECT || !(x->carries & 1)] };
+
+	if (x->f->value && x->carries == 2)
+		add_as(g, x, &to, p, below, 1, 0, 1);
+	else if (x->f->value && x->carries == 1)
+		add_as(g, x, &to, p, below, 1, 1, 0);
+	else if (x->f->value)
+		add_as(g, x, &to, p, below, 1, 1, 1);
+	else
+		add_as(g, x, &to, p, below, 0, x->carries & 1, x->carries >> 1);
+}
+
+static void seek_span(const struct feed *x, uint32_t receiver, struct place *p)
+{
+	const struct ff *f = x->f;
+	const uint64_t end = f->block_start[x->block + 1];
+
+	for (; p->entry < end; p->word += 2) {
+		uint32_t first = ff_word(f, p->word) >> 1, count = ff_word(f, p->word + 1);
+		if (first >= receiver)
+			return;
+		p->done = receiver - first < count ? receiver - first : 0;
+		p->entry += p->done ? p->done : count;
+		if (p->done)
+			return;
+	}
+}
+
+/* Ranges are whole patches: both sides of a patch are on one side of a bound. */
+static void seek_word(const struct feed *x, uint32_t receiver, struct place *p)
+{
+	uint64_t n = x->f->block_start[x->block + 1] - p->entry, at = 0;
+
+	while (n) {
+		uint64_t half = n / 2;
+		int below = ff_word(x->f, p->word + at + half) >> 1 < receiver;
+		at += below ? half + 1 : 0;
+		n = below ? n - half - 1 : half;
+	}
+	p->word += at;
+	p->entry += at;
+}
+
+/* A feed's first entry at or beyond a receiver. It and what follows is fetched. */
+static struct place find_place(const struct feed *x, uint32_t receiver)
+{
+	const struct ff *f = x->f;
+	struct place p = { ff_first_word(f, x->block), f->block_start[x->block], 0 };
+
+	if (receiver && ff_has_spans(f, x->block))
+		seek_span(x, receiver, &p);
+	else if (receiver)
+		seek_word(x, receiver, &p);
+	__builtin_prefetch(f->column16 ? (const void *)(f->column16 + p.word) : f->column + p.word);
+	__builtin_prefetch(f->value ? (const void *)(f->value + p.entry) : f->value64 + p.entry);
+	return p;
+}
+
+static void add_range(void *arg, size_t begin, size_t end, int thread)
+{
+	const struct gather *g = arg;
+	struct place place[AHEAD];
+
+	(void)thread;
+	for (size_t range = begin; range < end; range++)
+		for (size_t i = 0; i < g->feeds + AHEAD; i++) {
+			struct place *p = &place[i % AHEAD];
+			if (i >= AHEAD)
+				add_feed(g, &g->feed[i - AHEAD], *p, g->cut[range + 1]);
+			if (i < g->feeds)
+				*p = find_place(&g->feed[i], g->cut[range]);
+		}
+}
+
+/* ---- what blocks carry ---- */
+
+static enum part part_of(const struct transport *t, uint32_t row, uint32_t chain)
+{
+	int directional = t->row_kind[row] == FF_REFLECTED || t->row_kind[row] == FF_TRANSMITTED;
+
+	return chain == 0 && !directional ? DIRECT : CAUSTIC;
+}
+
+/* Variance of an element's irradiance, all groups together, from the sampling of the
+ * rows, as if each sample were independent, as row_samples allows for: a row of n
+ * samples that sends flux U, of which f lands here, adds U^2 f / n; one without samples,
+ * 0. For the four bands with the number of the channels in work. */
+static lanes variance_of(const struct gather *g, uint32_t row, uint64_t b)
+{
+	const struct transport *t = g->t;
+	uint32_t samples = t->row_samples[row];
+	size_t bands = (size_t)g->s->bands;
+	double one = samples ? t->block[t->row_block[row]].sum / samples : 0;
+	lanes v = { 0 };
+
+	for (size_t k = 0; k < LANES && g->first + k < bands; k++) {
+		double all = 0;
+		for (size_t c = g->first + k; c < g->channels; c += bands)
+			all += g->block_flux[0][b * g->channels + c] +
+			       g->block_flux[1][b * g->channels + c];
+		v[k] = all * all * one;
+	}
+	return v;
+}
+
+/* Float sums of variances stay in range whatever the unit of flux is. */
+static void set_unit(struct gather *g)
+{
+	const struct transport *t = g->t;
+
+	g->unit = 0;
+	for (uint32_t row = 0; row < t->rows; row++)
+		for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
+			lanes v = variance_of(g, row, b);
+			for (int k = 0; k < LANES; k++)
+				g->unit = fmax(g->unit, v[k]);
+		}
+	if (!(g->unit >= DBL_MIN))
+		g->unit = 1;
+}
+
+static void set_feed(const struct gather *g, uint32_t row, uint64_t b, uint8_t carries,
+                     struct feed *x)
+{
+	const struct block *block = &g->t->block[b];
+	size_t at = b * g->channels + g->first;
+
+	*x = (struct feed){ .f = g->t->shard[block->shard], .block = block->local,
+	                    .to_fresh = (uint8_t)part_of(g->t, row, block->chain),
+	                    .carries = carries };
+	for (size_t k = 0; k < LANES && g->first + k < g->channels; k++) {
+		x->fresh[k] = g->block_flux[0][at + k];
+		x->mixed[k] = g->block_flux[1][at + k];
+	}
+	x->variance = __builtin_convertvector(variance_of(g, row, b) * (1 / g->unit), lanes_f32);
+}
+
+/* Blocks with flux in the four channels in work, or any where they have variances. */
+static void set_feeds(struct gather *g)
+{
+	const struct transport *t = g->t;
+	const size_t last = g->first < (size_t)g->s->bands ? g->channels : g->first + LANES;
+
+	g->feeds = 0;
+	for (uint32_t row = 0; row < t->rows; row++)
+		for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
+			unsigned carries = 0;
+			for (size_t c = g->first; c < last && c < g->channels; c++) {
+				size_t at = b * g->channels + c;
+				carries |= (g->block_flux[0][at] > 0) |
+				           (unsigned)(g->block_flux[1][at] > 0) << 1;
+			}
+			if (carries)
+				set_feed(g, row, b, (uint8_t)carries, &g->feed[g->feeds++]);
+		}
+}
+
+/* ---- irradiance ---- */
+
+static void put_channels(void *arg, size_t begin, size_t end, int thread)
+{
+	const struct gather *g = arg;
+	const struct model *m = g->t->m;
+	double *to[H_PARTS] = { g->s->direct, g->s->caustic, g->s->indirect };
+	size_t bands = (size_t)g->s->bands;
+
+	(void)thread;
+	for (size_t es = begin; es < end; es++) {
+		uint32_t element = (uint32_t)(es >> 1), patch = m->element_patch[element];
+		size_t side = (es & 1) * g->receivers;
+		size_t from = side + (g->to_patches ? patch : element);
+		double area = g->to_patches ? m->patch_area[patch] : m->element_area[element];
+		for (size_t k = 0; k < LANES && g->first + k < g->channels; k++) {
+			size_t c = g->first + k;
+			size_t at = (c / bands * g->s->element_sides + es) * bands + c % bands;
+			for (int p = 0; p < H_PARTS; p++)
+				to[p][at] = g->flux[p][from][k] / area;
+			if (c < bands) {
+				double direct = (double)g->variance[0][from][k] * g->unit;
+				double other = (double)g->variance[1][from][k] * g->unit;
+				g->s->error_direct[at] = sqrt(direct) / area;
+				g->s->error[at] = sqrt(direct + other) / area;
+			}
+		}
+	}
+}
+
+/* Bytes of the values that are read and, where columns are lists, of these. */
+static double bytes_of(const struct gather *g)
+{
+	double bytes = 0;
+
+	for (size_t i = 0; i < g->feeds; i++) {
+		const struct ff *f = g->feed[i].f;
+		const uint64_t *entry = f->block_start + g->feed[i].block;
+		size_t word = f->column16 ? sizeof *f->column16 : sizeof *f->column;
+		size_t value = f->value ? sizeof *f->value : sizeof *f->value64;
+		bytes += (double)(entry[1] - entry[0]) *
+		         (double)(value + (ff_has_spans(f, g->feed[i].block) ? 0 : word));
+	}
+	return bytes;
+}
+
+static int gather_channels(struct gather *g, int threads, struct err *e)
+{
+	size_t n = 2 * g->receivers;
+	void *room, *variance, *feed;
+	lanes *at = lanes_new(H_PARTS * n, &room, "irradiance", e);
+
+	g->variance[0] = (lanes_f32 *)lanes_new(n, &variance, "irradiance", e);
+	g->variance[1] = g->variance[0] + n;
+	g->feed = (struct feed *)lanes_new(g->t->blocks * (sizeof *g->feed / sizeof(lanes)), &feed,
+	                                   "flux by chain", e);
+	int bad = !at || !variance || !g->feed;
+	for (int p = 0; !bad && p < H_PARTS; p++)
+		g->flux[p] = at + (size_t)p * n;
+	for (g->first = 0; !bad && g->first < g->channels; g->first += LANES) {
+		if (g->first) {
+			memset(at, 0, H_PARTS * n * sizeof *at);
+			memset(g->variance[0], 0, 2 * n * sizeof **g->variance);
+		}
+		set_unit(g);
+		set_feeds(g);
+		par_for(g->ranges, 1, threads, add_range, g, NULL);
+		par_for(g->s->element_sides, 4096, threads, put_channels, g, NULL);
+		g->bytes += bytes_of(g);
+	}
+	free(room);
+	free(variance);
+	free(feed);
+	return bad ? -1 : 0;
+}
+
+/* ---- flux by block ---- */
+
+/* Flux by block over the block's sum of values, for every row. O(runs). */
+static int block_fluxes(const struct transport *t, const struct solution *s, double *flux[2],
+                        struct err *e)
+{
+	struct sender sender;
+	size_t channels = solution_channels(s);
+	int bad = sender_init(&sender, t, s->groups, e);
+
+	for (uint32_t r = 0; !bad && r < t->rows; r++)
+		for (int fresh = 0; fresh < 2; fresh++) {
+			double *to = flux[fresh] + t->row_block[r] * channels;
+			send_block_flux(&sender, r, s->shot + (2 * (size_t)r + (size_t)fresh) * channels,
+			                to);
+			for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
+				for (size_t c = 0; c < channels; c++)
+					*to++ /= t->block[b].sum > 0 ? t->block[b].sum : 1;
+		}
+	sender_free(&sender);
+	return bad;
+}
+
+static int cut_ranges(struct gather *g, struct err *e)
+{
+	const struct model *m = g->t->m;
+	uint32_t i = 0;
+
+	if (!(g->cut = mem_new(g->ranges + 1, sizeof *g->cut, "irradiance", e)))
+		return -1;
+	for (uint32_t p = 0; p <= m->patches; p++) {
+		uint32_t begin = g->to_patches ? p : m->patch_start[p];
+		for (; i <= g->ranges && begin * (uint64_t)g->ranges >= i * (uint64_t)g->receivers; i++)
+			g->cut[i] = begin;
+	}
+	return 0;
+}
+
+int radiosity_gather(struct solution *s, const struct transport *t, int threads,
+                     struct radiosity_report *r, struct err *e)
+{
+	double *flux[2];
+	struct gather g = { .t = t, .s = s, .to_patches = t->shard[0]->to_patches,
+	                    .channels = solution_channels(s),
+	                    .ranges = threads > 1 ? (size_t)threads : 1 };
+
+	g.receivers = g.to_patches ? t->m->patches : t->m->elements;
+	for (int i = 0; i < 2; i++)
+		g.block_flux[i] = flux[i] = mem_new(t->blocks, g.channels * sizeof(double),
+		                                    "flux by chain", e);
+	int bad = !flux[0] || !flux[1] || block_fluxes(t, s, flux, e) ||
+	          cut_ranges(&g, e) || gather_channels(&g, threads, e);
+	r->gather_bytes = g.bytes;
+	free(g.cut);
+	free(flux[0]);
+	free(flux[1]);
+	return bad ? -1 : 0;
+}

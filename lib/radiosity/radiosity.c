@@ -1,0 +1,216 @@
+#include "lib/radiosity/radiosity.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "lib/base/mem.h"
+#include "lib/radiosity/light_groups.h"
+#include "lib/radiosity/shoot.h"
+
+/* ---- the beginning ---- */
+
+static int solution_arrays(struct solution *s, const struct model *m,
+                           const struct transport *t, struct err *e)
+{
+	size_t bands = (size_t)m->bands, es = 2 * m->elements, ps = 2 * m->patches;
+	size_t channels = solution_channels(s), parts = s->groups * es;
+
+	s->element_sides = es;
+	s->patch_sides = ps;
+	s->sources = model_sources(m);
+	s->links = t->links;
+	s->rows = t->rows;
+	s->direct = mem_new(parts, bands * sizeof(double), "irradiance", e);
+	s->caustic = mem_new(parts, bands * sizeof(double), "irradiance", e);
+	s->indirect = mem_new(parts, bands * sizeof(double), "irradiance", e);
+	s->error = mem_new(es, bands * sizeof(double), "irradiance", e);
+	s->error_direct = mem_new(es, bands * sizeof(double), "irradiance", e);
+	s->discretisation = mem_new(es, bands * sizeof(double), "irradiance", e);
+	s->discretisation_direct = mem_new(es, bands * sizeof(double), "irradiance", e);
+	s->unshot_emission = mem_new(s->sources, bands * sizeof(double), "unshot flux", e);
+	s->unshot_diffuse = mem_new(ps, channels * sizeof(double), "unshot flux", e);
+	s->unshot_link = mem_new(t->links, 2 * channels * sizeof(double), "unshot flux", e);
+	s->shot = mem_new(t->rows, 2 * channels * sizeof(double), "shot flux", e);
+	s->ledger = mem_new(LEDGER_TERMS, channels * sizeof(double), "ledger", e);
+	return s->direct && s->caustic && s->indirect && s->error && s->error_direct &&
+	       s->discretisation && s->discretisation_direct && s->unshot_emission &&
+	       s->unshot_diffuse && s->unshot_link && s->shot && s->ledger ? 0 : -1;
+}
+
+/* Flux that can be squared, for variances. */
+static const double brightest = 1e150;
+
+int solution_begin(struct solution *s, const struct model *m, const struct transport *t,
+                   int light_groups, struct err *e)
+{
+	double all = 0;
+
+	*s = (struct solution){ .bands = m->bands };
+	if (light_groups_set(s, m, light_groups, e) || solution_arrays(s, m, t, e))
+		return -1;
+	for (uint32_t i = 0; i < s->sources; i++)
+		for (int k = 0; k < m->bands; k++) {
+			uint32_t group = solution_group(s, m, i);
+			double flux = solver_emitted(m, i, k);
+			s->unshot_emission[i * (size_t)m->bands + (size_t)k] = flux;
+			s->ledger[group * (size_t)m->bands + (size_t)k] += flux;
+			all += flux;
+		}
+	if (!(all > 0))
+		return err_set(e, "no emitter: nothing in this scene gives light; give a material "
+		               "emission (glTF emissiveFactor, or emission_front in its extras) or "
+		               "add a light (KHR_lights_punctual)");
+	if (!(all < brightest))
+		return err_set(e, "the emitted flux, %g, is too large to compute with; lower the "
+		               "emission of the materials and lights", all);
+	return 0;
+}
+
+/* ---- rounds ---- */
+
+/* Lights come before the first round, whatever they are worth: they shoot once. 0 when the
+ * last shot stopped it. */
+static int shoot_lights(struct solver *v, uint64_t last_shot)
+{
+	const struct solution *s = v->s;
+	size_t bands = (size_t)s->bands;
+
+	for (uint32_t i = (uint32_t)s->patch_sides; i < s->sources; i++) {
+		double unshot = 0;
+		for (size_t k = 0; k < bands; k++)
+			unshot += s->unshot_emission[i * bands + k];
+		if (!(unshot > 0))
+			continue;
+		if (s->shots >= last_shot)
+			return 0;
+		solver_shoot_light(v, i);
+	}
+	return 1;
+}
+
+/* Shoots the rest of the current round; 0 when the last shot stopped it. */
+static int finish_round(struct solver *v, uint64_t last_shot)
+{
+	struct solution *s = v->s;
+	const double least = s->round[ROUND_LEAST];
+
+	for (uint32_t ps = (uint32_t)s->round[ROUND_NEXT]; ps < s->patch_sides; ps++) {
+		if (s->shots < last_shot) {
+			solver_shoot(v, ps, least);
+		} else if (solver_is_due(v, ps, least)) {
+			s->round[ROUND_NEXT] = ps;
+			return 0;
+		}
+	}
+	s->round[ROUND_LEAST] = s->round[ROUND_NEXT] = 0;
+	return 1;
+}
+
+/* ---- when to overshoot ---- */
+
+/* Enters what has been read since the last time. */
+static void count_work(struct solver *v)
+{
+	v->s->round[ROUND_WORK] += (double)(v->sender.runs - v->counted);
+	v->counted = v->sender.runs;
+}
+
+/* Whether shots would go on for longer than overshooting takes, by how much the last
+ * sweeps (as many runs as there are) have brought. */
+static int is_slow(struct solver *v, double unshot, double stop)
+{
+	enum { SWEEPS = 2, WORTH = 20 };
+	double *round = v->s->round, sweeps = round[ROUND_WORK] / (double)v->t->runs;
+
+	if (v->negative)
+		return 1;
+	if (!(sweeps >= SWEEPS))
+		return 0;
+	double rate = round[ROUND_UNSHOT] > 0 ? log(round[ROUND_UNSHOT] / unshot) / sweeps : INFINITY;
+	round[ROUND_WORK] = 0;
+	round[ROUND_UNSHOT] = unshot;
+	return stop > 0 && log(unshot / stop) > WORTH * rate;
+}
+
+static void tell(const struct solver *v, const struct radiosity_hooks *hooks,
+                 const struct radiosity_report *r)
+{
+	size_t bands = (size_t)v->s->bands;
+	double unshot[BANDS_MAX] = { 0 }, emitted[BANDS_MAX] = { 0 };
+
+	if (!hooks || !hooks->step)
+		return;
+	for (size_t c = 0; c < v->sender.channels; c++) {
+		unshot[c % bands] += ((const double *)v->unshot)[c];
+		emitted[c % bands] += v->s->ledger[c];
+	}
+	hooks->step(hooks->arg, &(struct radiosity_step){ r->rounds, v->s->shots, v->s->bands,
+	            unshot, emitted, v->residual });
+}
+
+/* A round goes down to a part of the largest priority. The more rounds, the better the order
+ * of shots, but each looks at all links. */
+enum { DEPTH = 32 };
+
+/* Rounds, or overshooting where they are slow, until `stop` or the last shot. */
+static int rounds(struct solver *v, const struct radiosity_options *o,
+                  const struct radiosity_hooks *hooks, struct radiosity_report *r,
+                  struct err *e)
+{
+	struct solution *s = v->s;
+	uint64_t last = o->max_shots > UINT64_MAX - s->shots ? UINT64_MAX : s->shots + o->max_shots;
+	int go_on = shoot_lights(v, last);
+	double top = solver_survey(v, &r->unshot);
+
+	while (go_on > 0 && (r->unshot > o->stop || s->round[ROUND_LEAST] != 0)) {
+		if (s->round[ROUND_LEAST] == 0 && s->shots >= last)
+			break;
+		if (s->round[ROUND_LEAST] == 0 && is_slow(v, r->unshot, o->stop)) {
+			go_on = solver_overshoot(v, r->unshot, o->stop, e);
+		} else {
+			if (s->round[ROUND_LEAST] == 0)
+				s->round[ROUND_LEAST] = top / DEPTH;
+			go_on = finish_round(v, last);
+		}
+		top = solver_survey(v, &r->unshot);
+		count_work(v);
+		r->rounds++;
+		tell(v, hooks, r);
+	}
+	sender_store(&v->sender, s);
+	return go_on < 0 ? -1 : 0;
+}
+
+static void report(const struct solver *v, int threads, struct radiosity_report *r)
+{
+	double emitted = 0;
+
+	for (size_t i = 0; i < v->parts.n; i++) {
+		double part = 0;
+		for (size_t g = 0; g < v->s->groups; g++)
+			part += v->emitted[i * v->s->groups + g];
+		r->components += part > 0;
+		emitted += part;
+	}
+	r->residual = v->residual;
+	r->guessed = v->guessed / emitted;
+	r->passes = v->t->runs ? (double)v->sender.runs / (double)v->t->runs : 0;
+	r->solve_bytes = v->sender.bytes;
+	r->bound = radiosity_tail_bound(v->t, &v->parts, v->s, threads, &r->solve_bytes) / emitted;
+}
+
+int radiosity_shoot(struct solution *s, const struct transport *t,
+                    const struct radiosity_options *o, const struct radiosity_hooks *hooks,
+                    struct radiosity_report *r, struct err *e)
+{
+	struct solver v;
+
+	*r = (struct radiosity_report){ 0 };
+	int bad = solver_init(&v, s, t, e) || components_need_sink(t, e) ||
+	          rounds(&v, o, hooks, r, e);
+	if (!bad)
+		report(&v, o->threads, r);
+	solver_free(&v);
+	return bad ? -1 : 0;
+}

@@ -1,0 +1,37 @@
+#include "lib/scatter/lobe_table.h"
+
+#include <math.h>
+
+#include "lib/scatter/lobe.h"
+
+/* Wider lobes have a normaliser that is not smooth at cosine 1. */
+static const double sharp_from = 5;
+
+void lobe_table_make(struct lobe_table *t, double k)
+{
+	t->k = k;
+	t->whole = lobe_normaliser(k, 1);
+	/* The horizon cuts off cos^k of more than the angle whose sine is `end`. */
+	t->end = fmin(1, 6 / sqrt(k + 1));
+	t->per_step = LOBE_TABLE / t->end;
+	if (k < sharp_from)
+		return;
+	for (int i = 0; i <= LOBE_TABLE + 2; i++) {
+		double c = (i - 1) / t->per_step;
+		/* What a lobe below the horizon loses, one above it has. */
+		t->value[i] = c < 0 ? t->whole - lobe_normaliser(k, -c) : lobe_normaliser(k, fmin(1, c));
+	}
+}
+
+double lobe_table_normaliser(const struct lobe_table *t, double cos_theta)
+{
+	if (t->k < sharp_from)
+		return lobe_normaliser(t->k, cos_theta);
+	if (cos_theta >= t->end)
+		return t->whole;
+	double at = cos_theta * t->per_step, i = fmin(floor(at), LOBE_TABLE - 1), u = at - i;
+	const double *p = &t->value[(int)i];
+	/* The cubic through four values (Lagrange). */
+	return (-p[0] * u * (u - 1) * (u - 2) + 3 * p[1] * (u + 1) * (u - 1) * (u - 2) -
+	        3 * p[2] * (u + 1) * u * (u - 2) + p[3] * (u + 1) * u * (u - 1)) / 6;
+}

@@ -1,0 +1,481 @@
+#include "lib/view/final_gather_rays.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "lib/base/mem.h"
+#include "lib/base/rng.h"
+#include "lib/base/vec3.h"
+
+static const double pi = 3.14159265358979323846;
+
+enum {
+	GATHER_BITS = 1 << 12,  /* points of the sequence that are kept */
+	PARTS = 4,              /* of the sequence, that a standard error comes from */
+	FIRST = 64, MOST = 1 << 14, /* rays of a part where an error is aimed at */
+	AT_ONCE = 512,          /* rays that are sorted by direction: eight for each of */
+	ERRORS = 8,             /* of so many rays the error of the solution is asked for */
+	CELLS = 8               /* so many squared cells, exactly, when they are aligned */
+};
+
+/* Standard error of a stretch of the sequence over that of as many independent parts: the
+ * parts fill one another's gaps. Measured. */
+static const double together = .6;
+
+/* A side is rough where interpolation misses so much of its irradiance; its direct light is
+ * computed, to such an error where it is sampled, up to so many times its size away. */
+static const double rough_from = .02;
+#define ROUGHLY .1
+#define CLOSE 4
+
+/* ---- what rays find ---- */
+
+/* Weights of corners 1 and 2 of an element's triangle at a vertex. */
+static void weights(const struct model *m, uint32_t triangle, const double *x, double w[2])
+{
+	const uint32_t *c = &m->triangle[3 * (size_t)triangle];
+	const double *a = &m->vertex[3 * (size_t)c[0]], *b = &m->vertex[3 * (size_t)c[1]],
+	             *d = &m->vertex[3 * (size_t)c[2]];
+	double whole[3], part[3];
+
+	v3_area(a, b, d, whole);
+	double square = v3_dot(whole, whole);
+	v3_area(a, x, d, part);
+	w[0] = v3_dot(part, whole) / square;
+	v3_area(a, b, x, part);
+	w[1] = v3_dot(part, whole) / square;
+}
+
+/* The radiance M / pi of a side at one corner of its element. */
+static double shown(const struct view_scene *v, const struct reconstruction *r, size_t corner, int side,
+                    size_t b)
+{
+	size_t bands = (size_t)v->m->bands;
+	const struct model *m = v->m;
+	const struct view_side *s =
+		&v->side[2 * model_patch_material(m, m->element_patch[corner / 3]) + (uint32_t)side];
+	const float *h = r->corner + 2 * bands * corner;
+
+	return s->black ? 0 : s->here[b] * (double)h[(size_t)side * bands + b] +
+	                      s->across[b] * (double)h[(size_t)!side * bands + b];
+}
+
+/* A linear function of the weights on a triangle, from its values at an element's corners. */
+struct linear {
+	double w[3][2], det;        /* of the corners */
+};
+
+static void find_linear(const struct model *m, size_t e, struct linear *l)
+{
+	for (size_t k = 0; k < 3; k++)
+		weights(m, m->element_triangle[e], &m->vertex[3 * (size_t)m->element[3 * e + k]], l->w[k]);
+	l->det = (l->w[1][0] - l->w[0][0]) * (l->w[2][1] - l->w[0][1]) -
+	         (l->w[1][1] - l->w[0][1]) * (l->w[2][0] - l->w[0][0]);
+}
+
+/* Adds it to coefficients c[0], c[bands], c[2 bands]. */
+static void add_linear(const struct linear *l, const double value[3], size_t bands, float *c)
+{
+	double p = value[1] - value[0], q = value[2] - value[0];
+	double c1 = l->det != 0 ? (p * (l->w[2][1] - l->w[0][1]) - q * (l->w[1][1] - l->w[0][1])) / l->det : 0;
+	double c2 = l->det != 0 ? (q * (l->w[1][0] - l->w[0][0]) - p * (l->w[2][0] - l->w[0][0])) / l->det : 0;
+
+	c[0] += (float)(value[0] - c1 * l->w[0][0] - c2 * l->w[0][1]);
+	c[bands] += (float)c1;
+	c[2 * bands] += (float)c2;
+}
+
+static void fill_element(const struct view_scene *v, const struct reconstruction *r, size_t e,
+                         float *radiance)
+{
+	size_t bands = (size_t)v->m->bands;
+	struct linear l;
+
+	find_linear(v->m, e, &l);
+	for (int side = 0; side < 2; side++)
+		for (size_t b = 0; b < bands; b++) {
+			double value[3];
+			for (size_t k = 0; k < 3; k++)
+				value[k] = shown(v, r, 3 * e + k, side, b);
+			add_linear(&l, value, bands, radiance + (2 * e + (size_t)side) * 3 * bands + b);
+		}
+}
+
+/* Is what interpolation misses of a side's light worth computing? */
+static int rough(const struct solution *s, size_t element_side)
+{
+	for (int b = 0; b < s->bands && s->discretisation; b++)
+		if (s->discretisation[element_side * (size_t)s->bands + (size_t)b] >
+		    rough_from * solution_irradiance(s, element_side, b))
+			return 1;
+	return 0;
+}
+
+static void find_kinds(struct gather_table *t, const struct solution *s)
+{
+	const struct model *m = t->v->m;
+
+	for (size_t i = 0; i < 2 * m->elements; i++) {
+		const struct view_side *side =
+			&t->v->side[2 * model_patch_material(m, m->element_patch[i / 2]) + i % 2];
+		if (side->black)
+			continue;
+		if (side->reflected.coefficient || side->transmitted.coefficient)
+			t->kind[i] |= GATHER_TAIL;
+		if (direct_exact(t->v->direct) &&
+		    ((side->diffuse && rough(s, i)) || (side->translucent && rough(s, i ^ 1))))
+			t->kind[i] |= GATHER_ROUGH;
+	}
+}
+
+int gather_table_init(struct gather_table *t, const struct view_scene *v, const struct solution *s,
+                      int threads, struct err *e)
+{
+	const struct model *m = v->m;
+	struct reconstruction rest = { 0 };
+
+	*t = (struct gather_table){ .v = v };
+	t->radiance = mem_new(6 * m->elements, (size_t)m->bands * sizeof *t->radiance, "gathering", e);
+	t->rest = mem_new(6 * m->elements, (size_t)m->bands * sizeof *t->rest, "gathering", e);
+	t->kind = mem_new(m->elements, 2, "gathering", e);
+	t->bits = mem_new(2 * GATHER_BITS, sizeof *t->bits, "gathering", e);
+	if (!t->radiance || !t->rest || !t->kind || !t->bits || locator_init(&t->locator, m, e) ||
+	    reconstruct(m, s, PART_CAUSTIC | PART_INDIRECT, threads, &rest, e) ||
+	    reconstruct(m, s, PART_INDIRECT, threads, &t->indirect, e))
+		return -1;
+	for (size_t i = 0; i < m->elements; i++) {
+		fill_element(v, &v->all, i, t->radiance);
+		fill_element(v, &rest, i, t->rest);
+	}
+	reconstruction_free(&rest);
+	find_kinds(t, s);
+	for (uint32_t i = 0; i < GATHER_BITS; i++)
+		for (int k = 0; k < 2; k++)
+			t->bits[k * GATHER_BITS + (int)i] = rng_sobol_bits(i, k);
+	return 0;
+}
+
+void gather_table_free(struct gather_table *t)
+{
+	free(t->radiance);
+	free(t->rest);
+	free(t->kind);
+	reconstruction_free(&t->indirect);
+	free(t->bits);
+	if (t->v)
+		locator_free(&t->locator);
+}
+
+int gather_worker_init(struct gather_worker *w, const struct gather_table *t,
+                       const struct view_scene *v, int depth, struct err *e)
+{
+	*w = (struct gather_worker){ .t = t };
+	w->tails = mem_new(1, sizeof *w->tails, "gathering", e);
+	w->direct = direct_worker_new(v->direct, e);
+	if (w->tails)
+		w->tails->depth = depth;
+	return w->tails && w->direct ? 0 : -1;
+}
+
+void gather_worker_free(struct gather_worker *w)
+{
+	direct_worker_free(w->direct);
+	free(w->tails);
+}
+
+/* ---- rays ---- */
+
+/* Cosine and sine of 2 pi u for a batch, u in [0, 1), to 1e-6: Taylor series of half the
+ * angle, at most pi / 2. */
+static void turns(const float *u, float *cosine, float *sine)
+{
+	for (int i = 0; i < RAY_BATCH; i++) {
+		float a = (u[i] - .5f) * 3.14159265f, q = a * a;
+		float s = a * (1 + q * (-1.f / 6 + q * (1.f / 120 + q * (-1.f / 5040 + q * (1.f / 362880 -
+		          q * (1.f / 39916800))))));
+		float c = 1 + q * (-.5f + q * (1.f / 24 + q * (-1.f / 720 + q * (1.f / 40320 +
+		          q * (-1.f / 3628800 + q * (1.f / 479001600))))));
+		/* u - 1/2 is half a turn off. */
+		cosine[i] = -(c * c - s * s);
+		sine[i] = -2 * s * c;
+	}
+}
+
+/* Points [first, first + n) of a scramble, those of like directions together: packets of
+ * rays then take one way through the scene. */
+static void points(const struct gather_table *t, const uint32_t seed[2], uint32_t first, uint32_t n,
+                   float sorted[2][AT_ONCE])
+{
+	float u[2][AT_ONCE];
+	uint32_t begin[CELLS * CELLS + 1] = { 0 }, cell[AT_ONCE];
+
+	for (uint32_t k = 0; k < 2; k++)
+		for (uint32_t i = 0; i < n; i++) {
+			uint32_t at = first + i;
+			uint32_t bits = at < GATHER_BITS ? t->bits[k * GATHER_BITS + at]
+			                                 : rng_sobol_bits(at, (int)k);
+			u[k][i] = (float)(rng_scramble_bits(bits, seed[k]) >> 8) * 0x1p-24f;
+		}
+	for (uint32_t i = 0; i < n; i++) {
+		cell[i] = (uint32_t)(CELLS * u[0][i]) * CELLS + (uint32_t)(CELLS * u[1][i]);
+		begin[cell[i] + 1]++;
+	}
+	for (int i = 0; i < CELLS * CELLS; i++)
+		begin[i + 1] += begin[i];
+	for (uint32_t i = 0; i < n; i++) {
+		uint32_t to = begin[cell[i]]++;
+		sorted[0][to] = u[0][i];
+		sorted[1][to] = u[1][i];
+	}
+}
+
+/* Directions by the cosine about the last axis of a frame. */
+static void aim(double frame[3][3], const float *u0, const float *u1, struct ray_batch *b)
+{
+	float c[RAY_BATCH], s[RAY_BATCH], f[3][3];
+
+	for (int k = 0; k < 3; k++)
+		for (int j = 0; j < 3; j++)
+			f[k][j] = (float)frame[k][j];
+	turns(u1, c, s);
+	for (int i = 0; i < RAY_BATCH; i++) {
+		float r = sqrtf(u0[i]), z = sqrtf(1 - u0[i]);
+		for (int k = 0; k < 3; k++)
+			b->dir[k][i] = r * c[i] * f[0][k] + r * s[i] * f[1][k] + z * f[2][k];
+	}
+}
+
+void gather_places(const struct gather_table *t, const struct ray_batch *b, uint32_t n,
+                   uint32_t place[RAY_BATCH])
+{
+	/* Many loads from all over the tables at a time take little longer than one. */
+	for (uint32_t i = 0; i < n; i++)
+		if (b->triangle[i] != RAY_MISS) {
+			place[i] = 2 * locate(&t->locator, b->triangle[i], b->w[0][i], b->w[1][i]) + b->side[i];
+			__builtin_prefetch(&t->radiance[3 * (size_t)t->v->m->bands * place[i]]);
+			__builtin_prefetch(&t->kind[place[i]]);
+		}
+}
+
+void gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_t i, uint32_t place,
+                const double *weight, double *sum)
+{
+	size_t bands = (size_t)t->v->m->bands;
+	const float *c = t->radiance + 3 * bands * place;
+	float w1 = b->w[0][i], w2 = b->w[1][i];
+
+	for (size_t k = 0; k < bands; k++) {
+		float l = c[k] + c[bands + k] * w1 + c[2 * bands + k] * w2;
+		sum[k] += l > 0 ? weight[k] * (double)l : 0;
+	}
+}
+
+static void hit_point(const struct model *m, uint32_t triangle, double p, double q, double x[3])
+{
+	const uint32_t *c = &m->triangle[3 * (size_t)triangle];
+
+	for (size_t k = 0; k < 3; k++)
+		x[k] = (1 - p - q) * m->vertex[3 * (size_t)c[0] + k] +
+		       p * m->vertex[3 * (size_t)c[1] + k] + q * m->vertex[3 * (size_t)c[2] + k];
+}
+
+/* Has the direct light computed where ray i of a batch met something, at y. */
+static void put_close(struct gather_worker *w, const struct ray_batch *b, uint32_t i, size_t place,
+                      const double y[3], double *sum)
+{
+	struct gather_close *to = &w->close[w->closes];
+
+	to->place = place;
+	to->turn = w->closes++;
+	to->sum = sum;
+	to->w[0] = (double)b->w[0][i];
+	to->w[1] = (double)b->w[1][i];
+	memcpy(to->x, y, sizeof to->x);
+}
+
+/* Adds the radiance of a point with its direct light computed. */
+static void add_close(struct gather_worker *w, const struct gather_close *p)
+{
+	static const double middle[3] = { 1. / 3, 1. / 3, 1. / 3 };
+	const struct view_scene *v = w->t->v;
+	size_t bands = (size_t)v->m->bands;
+	const struct view_side *s =
+		&v->side[2 * model_patch_material(v->m, v->m->element_patch[p->place / 2]) + p->place % 2];
+	const float *rest = w->t->rest + 3 * bands * p->place;
+	double h[BANDS_MAX], error[BANDS_MAX], usual[BANDS_MAX];
+
+	for (size_t b = 0; b < bands; b++)
+		p->sum[b] += fmax(0, (double)rest[b] + (double)rest[bands + b] * p->w[0] +
+		                     (double)rest[2 * bands + b] * p->w[1]);
+	for (int across = 0; across < 2; across++) {
+		const double *part = across ? s->across : s->here;
+		int side = (int)(p->place % 2) ^ across;
+		if (!(across ? s->translucent : s->diffuse))
+			continue;
+		direct_begin(w->direct, (uint32_t)(p->place / 2 * 2) + (uint32_t)side);
+		reconstruction_at(&v->all, p->place / 2, side, middle, usual);
+		if (direct_at(w->direct, p->x, p->place, ROUGHLY, usual, h, error, &w->e))
+			return;
+		for (size_t b = 0; b < bands; b++)
+			p->sum[b] += part[b] * h[b];
+	}
+}
+
+static int by_place(const void *x, const void *y)
+{
+	const struct gather_close *a = x, *b = y;
+
+	return a->place != b->place ? (a->place > b->place) - (a->place < b->place)
+	                            : (a->turn > b->turn) - (a->turn < b->turn);
+}
+
+/* Adds what is close, side by side: points of one share what is between it and emitters. */
+static void add_closes(struct gather_worker *w)
+{
+	qsort(w->close, w->closes, sizeof *w->close, by_place);
+	for (uint32_t i = 0; i < w->closes && !w->e.set; i++)
+		add_close(w, &w->close[i]);
+	w->closes = 0;
+}
+
+/* Adds what errs in the radiance of what ray i of a batch met, at a distance d of x. */
+static void add_blur(struct gather_worker *w, const double d[3], uint32_t place, int computed)
+{
+	const struct view_scene *v = w->t->v;
+	const struct model *m = v->m;
+	size_t bands = (size_t)m->bands, e = place / 2;
+	const struct view_side *s = &v->side[2 * model_patch_material(m, m->element_patch[e]) + place % 2];
+	double square = v3_dot(d, d);
+	double part = fabs(v3_dot(d, w->normal) * v3_dot(d, &m->element_normal[3 * e])) * m->element_area[e] /
+	              (pi * square * square);
+
+	for (size_t k = 0; k < bands; k++)
+		w->blur[k] +=
+			s->here[k] * s->here[k] * view_blurred(v, place * bands + k, part, computed) +
+			s->across[k] * s->across[k] * view_blurred(v, (place ^ 1) * bands + k, part, computed);
+}
+
+/* Follows ray i of a batch beyond what it met. */
+static void go_on(struct gather_worker *w, const double x[3], const struct ray_batch *b, uint32_t i,
+                  uint32_t place, const struct gather_going *begun, double *sum)
+{
+	const struct gather_table *t = w->t;
+	int tail = t->kind[place] & GATHER_TAIL, close = t->kind[place] & GATHER_ROUGH && !tail;
+	double y[3], d[3];
+
+	if (close || i % ERRORS == 0) {
+		hit_point(t->v->m, b->triangle[i], (double)b->w[0][i], (double)b->w[1][i], y);
+		v3_sub(y, x, d);
+		close = close && v3_dot(d, d) < CLOSE * CLOSE * t->v->m->element_area[place / 2];
+	}
+	if (i % ERRORS == 0)
+		add_blur(w, d, place, close);
+	if (tail)
+		gather_go_on(w->tails, t, b, i, place, begun);
+	if (close)
+		put_close(w, b, i, place, y, sum);
+	else
+		gather_add(t, b, i, place, begun->weight, sum);
+}
+
+/* Adds the radiance that the rays of a batch find. */
+static void add_batch(struct gather_worker *w, const double x[3], struct ray_batch *b, uint32_t n,
+                      uint64_t seed, double *sum)
+{
+	const struct gather_table *t = w->t;
+	size_t bands = (size_t)t->v->m->bands;
+	struct gather_going begun = { .depth = 0 };
+	uint32_t place[RAY_BATCH];
+
+	for (size_t k = 0; k < bands; k++)
+		begun.weight[k] = 1;
+	if (w->closes + n > GATHER_CLOSES)
+		add_closes(w);
+	ray_nearest_batch(t->v->rays, b, n);
+	gather_places(t, b, n, place);
+	w->rays += n;
+	for (uint32_t i = 0; i < n; i++) {
+		w->blurs += i % ERRORS == 0;
+		if (b->triangle[i] == RAY_MISS)
+			continue;
+		begun.random = rng_seed(seed, i);
+		go_on(w, x, b, i, place[i], &begun, sum);
+	}
+	gather_follow(w->tails, t, RAY_BATCH - 1, sum);
+}
+
+/* Adds the radiance that points [first, first + n) of a scramble find. */
+static void add_rays(struct gather_worker *w, const double x[3], double frame[3][3],
+                     uint64_t seed, uint32_t first, uint32_t n, double *sum)
+{
+	struct ray_units units = ray_units(w->t->v->rays);
+	uint32_t scramble[2] = { rng_sobol_seed(seed, 0), rng_sobol_seed(seed, 1) };
+	float u[2][AT_ONCE] = { { 0 } };
+	struct ray_batch b;
+
+	for (int k = 0; k < 3; k++)
+		for (int i = 0; i < RAY_BATCH; i++)
+			b.org[k][i] = (float)((x[k] - units.centre[k]) * units.per_unit);
+	for (uint32_t at = 0; at < n; at += AT_ONCE) {
+		uint32_t some = n - at < AT_ONCE ? n - at : AT_ONCE;
+		points(w->t, scramble, first + at, some, u);
+		for (uint32_t i = 0; i < some; i += RAY_BATCH) {
+			aim(frame, &u[0][i], &u[1][i], &b);
+			add_batch(w, x, &b, some - i < RAY_BATCH ? some - i : RAY_BATCH,
+			          rng_mix(seed + first + at + i), sum);
+		}
+	}
+	gather_follow(w->tails, w->t, 0, sum);
+}
+
+/* Irradiance from the sums of parts of `rays` rays each, and its standard error. 1 if that
+ * is small enough. */
+static int settled(double part[PARTS][BANDS_MAX], int bands, double rays, double relative,
+                   const double *scale, double *h, double *error)
+{
+	int good = 1;
+
+	for (int b = 0; b < bands; b++) {
+		double mean = 0, square = 0;
+		for (int p = 0; p < PARTS; p++)
+			mean += part[p][b] / PARTS;
+		for (int p = 0; p < PARTS; p++)
+			square += (part[p][b] - mean) * (part[p][b] - mean);
+		h[b] = pi * mean / rays;
+		error[b] = pi * together * sqrt(square / (PARTS * (PARTS - 1))) / rays;
+		good &= error[b] <= relative * scale[b];
+	}
+	return good;
+}
+
+void gather_point(struct gather_worker *w, const double x[3], const double n[3], uint64_t seed,
+                  int rays, double relative, const double *scale, struct gathered *to)
+{
+	double part[PARTS][BANDS_MAX] = { { 0 } }, frame[3][3];
+	int bands = w->t->v->m->bands;
+	uint32_t each = relative > 0 ? FIRST : (uint32_t)(rays + PARTS - 1) / PARTS;
+
+	memset(w->blur, 0, sizeof w->blur);
+	w->blurs = 0;
+	memcpy(w->normal, n, sizeof w->normal);
+	v3_frame(n, frame[0], frame[1]);
+	memcpy(frame[2], n, sizeof frame[2]);
+	for (uint32_t p = 0; p < PARTS; p++)
+		add_rays(w, x, frame, seed, p * each, each, part[p]);
+	add_closes(w);
+	while (!settled(part, bands, each, relative, scale, to->h, to->error) && relative > 0 && each < MOST) {
+		/* As many again: the parts so far are half as many, twice as long. */
+		each *= 2;
+		for (int b = 0; b < bands; b++) {
+			part[0][b] += part[1][b];
+			part[1][b] = part[2][b] + part[3][b];
+			part[2][b] = part[3][b] = 0;
+		}
+		for (uint32_t p = 2; p < PARTS; p++)
+			add_rays(w, x, frame, seed, p * each, each, part[p]);
+		add_closes(w);
+	}
+	for (int b = 0; b < bands; b++)
+		to->common[b] = pi * sqrt(w->blur[b] / w->blurs);
+}

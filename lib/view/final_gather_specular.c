@@ -1,0 +1,156 @@
+#include "lib/view/final_gather_specular.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "lib/base/vec3.h"
+#include "lib/scatter/lobe.h"
+#include "lib/view/final_gather_rays.h"
+
+/* Rays of less weight are followed by as much less chance. */
+static const double worth_following = .25;
+
+/* A way on from a surface. */
+struct way {
+	const struct view_lobe *lobe;
+	int side;                   /* that it goes off to */
+	double axis[3];
+};
+
+static double carries(const struct view_lobe *lobe, const struct gather_going *g, int bands)
+{
+	double sum = 0;
+
+	for (int b = 0; b < bands && lobe->coefficient; b++)
+		sum += g->weight[b] * lobe->coefficient[b];
+	return sum;
+}
+
+/* Chooses a way by what it carries. 0 if the ray ends. */
+static int choose(const struct view_side *s, int bands, int side, struct gather_going *g,
+                  struct way *way)
+{
+	double reflected = carries(&s->reflected, g, bands);
+	double all = reflected + carries(&s->transmitted, g, bands), most = 0;
+
+	if (!(all > 0))
+		return 0;
+	int through = rng_uniform(&g->random) * all >= reflected;
+	double chance = (through ? all - reflected : reflected) / all;
+	way->lobe = through ? &s->transmitted : &s->reflected;
+	way->side = through ? !side : side;
+	for (int b = 0; b < bands; b++) {
+		g->weight[b] *= way->lobe->coefficient[b] / chance;
+		most = fmax(most, g->weight[b]);
+	}
+	double follow = fmin(1, most / worth_following);
+	for (int b = 0; b < bands; b++)
+		g->weight[b] /= follow;
+	return rng_uniform(&g->random) < follow;
+}
+
+/* A direction of a lobe in place of its axis; 0 if it is below the horizon. Weights as in
+ * lib/view_lobe. */
+static int scatter(const struct view_lobe *lobe, enum lobe_kind kind, int bands, const double normal[3],
+                   double cos_o, struct gather_going *g, double dir[3])
+{
+	double axis[3] = { dir[0], dir[1], dir[2] };
+	double u[2] = { rng_uniform(&g->random), rng_uniform(&g->random) };
+
+	if (kind == LOBE_RECIPROCAL)
+		lobe_sample_whole(lobe->k, axis, u, dir);
+	else
+		lobe_sample(lobe->k, axis, normal, u, dir);
+	double cos_i = v3_dot(normal, dir);
+	if (!(cos_i > 0))
+		return 0;
+	double weight = kind == LOBE_RECIPROCAL
+	              ? cos_i / fmax(cos_i, cos_o)
+	              : cos_i / cos_o * lobe_table_normaliser(&lobe->table, cos_o) /
+	                lobe_table_normaliser(&lobe->table, cos_i);
+	for (int b = 0; b < bands; b++)
+		g->weight[b] *= weight;
+	return 1;
+}
+
+/* The point that a ray of a batch met, off its surface along the normal. */
+static void leave(const struct gather_table *t, const struct ray_batch *b, uint32_t i,
+                  const double normal[3], float org[3])
+{
+	const struct model *m = t->v->m;
+	const uint32_t *c = &m->triangle[3 * (size_t)b->triangle[i]];
+	struct ray_units units = ray_units(t->v->rays);
+	double p = (double)b->w[0][i], q = (double)b->w[1][i], x[3];
+
+	for (size_t k = 0; k < 3; k++)
+		x[k] = (1 - p - q) * m->vertex[3 * (size_t)c[0] + k] +
+		       p * m->vertex[3 * (size_t)c[1] + k] + q * m->vertex[3 * (size_t)c[2] + k];
+	ray_leave(t->v->rays, normal, x);
+	for (int k = 0; k < 3; k++)
+		org[k] = (float)((x[k] - units.centre[k]) * units.per_unit);
+}
+
+void gather_go_on(struct gather_tails *s, const struct gather_table *t, const struct ray_batch *b,
+                  uint32_t i, size_t place, const struct gather_going *g)
+{
+	const struct model *m = t->v->m;
+	const struct view_side *seen =
+		&t->v->side[2 * model_patch_material(m, m->element_patch[place / 2]) + place % 2];
+	const double *front = &m->element_normal[3 * (place / 2)];
+	struct gather_going *to = &s->going[s->waiting];
+	double dir[3], normal[3];
+	struct way way;
+
+	*to = *g;
+	if (++to->depth > s->depth || !choose(seen, m->bands, (int)(place % 2), to, &way))
+		return;
+	for (int k = 0; k < 3; k++) {
+		dir[k] = (double)b->dir[k][i];
+		normal[k] = way.side == FRONT ? front[k] : -front[k];
+	}
+	v3_normalise(dir);
+	double cosine = v3_dot(dir, front);
+	if (way.lobe == &seen->reflected)
+		v3_mad(dir, -2 * cosine, front, dir);
+	if (!isinf(way.lobe->k) && !scatter(way.lobe, m->lobe, m->bands, normal, fmax(fabs(cosine), 1e-14),
+	                                    to, dir))
+		return;
+	leave(t, b, i, normal, to->org);
+	for (int k = 0; k < 3; k++)
+		to->dir[k] = (float)dir[k];
+	s->waiting++;
+}
+
+/* Takes the last rays that wait into the batch. */
+static uint32_t take(struct gather_tails *s)
+{
+	uint32_t n = s->waiting < RAY_BATCH ? s->waiting : RAY_BATCH;
+
+	s->waiting -= n;
+	memcpy(s->now, &s->going[s->waiting], n * sizeof *s->now);
+	for (uint32_t i = 0; i < n; i++)
+		for (int k = 0; k < 3; k++) {
+			s->batch.org[k][i] = s->now[i].org[k];
+			s->batch.dir[k][i] = s->now[i].dir[k];
+		}
+	return n;
+}
+
+void gather_follow(struct gather_tails *s, const struct gather_table *t, uint32_t left, double *sum)
+{
+	uint32_t place[RAY_BATCH];
+
+	while (s->waiting > left) {
+		uint32_t n = take(s);
+		ray_nearest_batch(t->v->rays, &s->batch, n);
+		gather_places(t, &s->batch, n, place);
+		s->rays += n;
+		for (uint32_t i = 0; i < n; i++) {
+			if (s->batch.triangle[i] == RAY_MISS)
+				continue;
+			gather_add(t, &s->batch, i, place[i], s->now[i].weight, sum);
+			if (t->kind[place[i]] & GATHER_TAIL)
+				gather_go_on(s, t, &s->batch, i, place[i], &s->now[i]);
+		}
+	}
+}

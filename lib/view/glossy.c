@@ -1,0 +1,316 @@
+#include "lib/view/glossy.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "lib/base/rng.h"
+#include "lib/base/vec3.h"
+#include "lib/scatter/lobe.h"
+#include "lib/view/shade_tile.h"
+
+static const double pi = 3.14159265358979323846;
+
+enum {
+	PARTS = 4,             /* of the samples, that a standard error comes from */
+	FIRST = 4, MOST = 64,  /* samples of a part where an error is aimed at */
+	PROBES = 8             /* of each of two parts that tell how far one ray is off */
+};
+
+/* Standard error of a stretch of the sequence over that of as many independent parts: the
+ * parts fill one another's gaps. Measured. */
+static const double together = .8;
+
+/* Images of emitters are aimed at if they may bring such a part of the pixel's light. */
+static const double worth_aiming = .01;
+
+/* ---- the lobe as a weight ---- */
+
+/* lib/bsdf's f cos theta_i of a lobe with unit coefficient, over its density. */
+static double per_density(const struct view_lobe_seen *l, enum lobe_kind kind, double cos_i)
+{
+	return kind == LOBE_RECIPROCAL
+	     ? cos_i / fmax(cos_i, l->cosine)
+	     : cos_i / l->cosine * lobe_table_normaliser(l->table, l->cosine) /
+	       lobe_table_normaliser(l->table, cos_i);
+}
+
+/* That samples are taken by, of solid angle. */
+static double density(const struct view_lobe_seen *l, enum lobe_kind kind, const double dir[3])
+{
+	double power = lobe_power(l->k, v3_dot(l->axis, dir));
+
+	return kind == LOBE_RECIPROCAL ? (l->k + 1) / (2 * pi) * power
+	                               : power / lobe_table_normaliser(l->table, l->cosine);
+}
+
+static double weight_at(const double dir[3], const void *arg)
+{
+	const struct view_lobe_weight *w = arg;
+	double cos_i = v3_dot(w->l->normal, dir), power = lobe_power(w->l->k, v3_dot(w->l->axis, dir));
+
+	if (!(cos_i > 0) || power == 0)
+		return 0;
+	return w->kind == LOBE_RECIPROCAL
+	     ? (w->l->k + 1) / (2 * pi) * power * cos_i / fmax(cos_i, w->l->cosine)
+	     : power * cos_i / (w->l->cosine * lobe_table_normaliser(w->l->table, cos_i));
+}
+
+struct direct_weight view_lobe_weight(const struct view_lobe_weight *w)
+{
+	/* cos^k falls to exp(-1/2) over its width and to 1e-8 at its reach. */
+	struct direct_weight d = { .at = weight_at, .arg = w, .width = 1 / sqrt(w->l->k + 1),
+	                           .reach = acos(exp(-18.4 / fmax(w->l->k, 1e-9))) };
+
+	memcpy(d.axis, w->l->axis, sizeof d.axis);
+	return d;
+}
+
+/* ---- samples ---- */
+
+/* Sums over the samples of a part. */
+struct part {
+	double rest[BANDS_MAX], lit[BANDS_MAX];
+};
+
+/* All samples of a lobe. */
+struct run {
+	struct view_walker *w;
+	const struct view_branch *b;
+	const struct view_lobe_seen *l;
+	const double *coefficient;
+	struct view_branch *next;
+	uint32_t first;          /* index of the first sample */
+	struct part part[PARTS];
+};
+
+/* Follows the next branch to its end. */
+static void follow(struct run *r, double scale, struct part *to)
+{
+	struct view_walker *w = r->w;
+	size_t below = w->waiting;
+
+	memset(w->directional, 0, sizeof w->directional);
+	memset(w->lit, 0, sizeof w->lit);
+	view_push(w, r->b, r->next, r->coefficient, scale);
+	view_run(w, below);
+	for (int b = 0; b < w->v->m->bands; b++) {
+		to->rest[b] += w->directional[b];
+		to->lit[b] += w->lit[b];
+	}
+}
+
+/* Aims at an image of an emitter, for sample i, and follows that. */
+static void follow_aimed(struct run *r, uint32_t i, struct part *to)
+{
+	const struct view_images *images = &r->w->v->images;
+	const struct view_lobe_weight weight = { r->l, r->w->v->m->lobe };
+	struct view_branch *next = r->next;
+	uint32_t image;
+	double u[3];
+
+	for (int k = 0; k < 3; k++)
+		u[k] = rng_sobol(r->first + i, 2 + k, next->seed);
+	double chance = view_aim_at(images, &r->w->aim, u, next->dir, &image);
+	if (!(chance > 0))
+		return;
+	next->aimed = 1 + image;
+	follow(r, weight_at(next->dir, &weight) / (chance + density(r->l, weight.kind, next->dir)), to);
+	next->aimed = 0;
+}
+
+/* Follows sample i to its end and adds it to a part; without one, has it wait. */
+static void follow_sample(struct run *r, uint32_t i, struct part *to)
+{
+	const struct view_lobe_seen *l = r->l;
+	enum lobe_kind kind = r->w->v->m->lobe;
+	struct view_walker *w = r->w;
+	struct view_branch *next = r->next;
+
+	next->index = r->first + i;
+	double u[2] = { rng_sobol(next->index, 0, next->seed), rng_sobol(next->index, 1, next->seed) };
+	if (kind == LOBE_RECIPROCAL)
+		lobe_sample_whole(l->k, l->axis, u, next->dir);
+	else
+		lobe_sample(l->k, l->axis, l->normal, u, next->dir);
+	double cos_i = v3_dot(l->normal, next->dir);
+	if (!(cos_i > 0))
+		return;
+	if (!to) {
+		view_push(w, r->b, next, r->coefficient, per_density(l, kind, cos_i));
+		return;
+	}
+	next->density = density(l, kind, next->dir);
+	follow(r, per_density(l, kind, cos_i), to);
+}
+
+static void follow_both(struct run *r, uint32_t i, struct part *to)
+{
+	follow_sample(r, i, to);
+	if (r->w->aim.sum > 0)
+		follow_aimed(r, i, to);
+}
+
+/* What is aimed at has to bring a part of the light of a pixel. */
+static void aim(struct view_walker *w, const struct view_branch *b, const struct view_lobe_seen *l,
+                const double *coefficient)
+{
+	double other = 0, most = 0;
+
+	for (int i = 0; i < w->v->m->bands; i++) {
+		other += l->other[i] / w->v->m->bands;
+		most = fmax(most, b->weight[i] * coefficient[i]);
+	}
+	view_aim_begin(&w->v->images, l, worth_aiming * other / most, &w->aim);
+}
+
+/* Mean and variance of n samples in `parts` parts, with emitters or without. */
+static void measure(const struct run *r, int parts, double n, int lit, double *mean, double *variance)
+{
+	for (int b = 0; b < r->w->v->m->bands; b++) {
+		double sum = 0, square = 0;
+		for (int p = 0; p < parts; p++)
+			sum += r->part[p].rest[b] + (lit ? r->part[p].lit[b] : 0);
+		for (int p = 0; p < parts; p++) {
+			double off = r->part[p].rest[b] + (lit ? r->part[p].lit[b] : 0) - sum / parts;
+			square += off * off;
+		}
+		mean[b] = sum / n;
+		variance[b] = parts > 1 ? together * together * square * parts / ((parts - 1) * n * n) : 0;
+	}
+}
+
+static int settled(const struct run *r, double n)
+{
+	double mean[BANDS_MAX], variance[BANDS_MAX], aim = r->w->shader->lobe_relative;
+
+	measure(r, PARTS, n, !direct_exact(r->w->v->direct), mean, variance);
+	for (int b = 0; b < r->w->v->m->bands; b++) {
+		double all = aim * (mean[b] + r->l->other[b]);
+		if (variance[b] > all * all)
+			return 0;
+	}
+	return 1;
+}
+
+/* As many samples as it takes: returns their number. */
+static uint32_t follow_until(struct run *r)
+{
+	uint32_t each = FIRST;
+
+	for (uint32_t i = 0; i < PARTS * each; i++)
+		follow_both(r, i, &r->part[i / each]);
+	while (!settled(r, PARTS * each) && each < MOST) {
+		/* As many again: the parts so far are half as many, twice as long. */
+		each *= 2;
+		for (int b = 0; b < r->w->v->m->bands; b++)
+			for (int k = 0; k < 2; k++) {
+				double *at[PARTS];
+				for (int p = 0; p < PARTS; p++)
+					at[p] = k ? &r->part[p].lit[b] : &r->part[p].rest[b];
+				*at[0] += *at[1];
+				*at[1] = *at[2] + *at[3];
+				*at[2] = *at[3] = 0;
+			}
+		for (uint32_t i = 2 * each; i < PARTS * each; i++)
+			follow_both(r, i, &r->part[i / each]);
+	}
+	return PARTS * each;
+}
+
+/* How many, fewer where what is before the lobe has dimmed it. */
+static uint32_t fixed_number(const struct run *r)
+{
+	double most = 0;
+
+	for (int b = 0; b < r->w->v->m->bands; b++)
+		most = fmax(most, r->b->weight[b] * r->coefficient[b]);
+	return (uint32_t)fmax(1, fmin(1, most) * r->w->o->lobe_samples + .5);
+}
+
+/* The emitters' part waits: by formula it may be better than what samples found of it. */
+static void put_light(struct run *r, int parts, double n, const double *lit)
+{
+	struct view_lobe_request q = { .slot = r->w->slot, .l = *r->l };
+	double mean[BANDS_MAX];
+
+	for (int b = 0; b < r->w->v->m->bands; b++) {
+		q.weight[b] = r->b->weight[b] * r->coefficient[b];
+		q.found[b] = lit[b];
+	}
+	measure(r, parts, n, 0, mean, q.rest);
+	measure(r, parts, n, 1, mean, q.all);
+	view_shader_put_lobe(r->w->shader, &q);
+}
+
+void view_lobe_follow(struct view_walker *w, const struct view_branch *b,
+                      const struct view_lobe_seen *l, const double *coefficient,
+                      struct view_branch *next)
+{
+	struct run r = { .w = w, .b = b, .l = l, .coefficient = coefficient, .next = next };
+	double directional[BANDS_MAX], cut[BANDS_MAX], lit[BANDS_MAX] = { 0 };
+	int parts = PARTS;
+
+	next->lobes = 1;
+	if (b->lobes) {
+		r.first = b->index;
+		follow_sample(&r, 0, NULL);
+		return;
+	}
+	memcpy(directional, w->directional, sizeof directional);
+	memcpy(cut, w->cut, sizeof cut);
+	memset(w->cut, 0, sizeof w->cut);
+	memset(w->blurred, 0, sizeof w->blurred);
+	next->straight = 1;
+	next->turns = 0;
+	aim(w, b, l, coefficient);
+	uint32_t n = w->o->lobe_samples == VIEW_LOBE_ENOUGH ? PARTS * MOST : fixed_number(&r);
+	next->share = b->share / n;
+	if (w->o->lobe_samples == VIEW_LOBE_ENOUGH) {
+		r.first = b->index * n;
+		n = follow_until(&r);
+	} else {
+		parts = n < PARTS ? (int)n : PARTS;
+		r.first = b->index * (uint32_t)w->o->lobe_samples;
+		for (uint32_t i = 0; i < n; i++)
+			follow_both(&r, i, &r.part[i * (uint32_t)parts / n]);
+	}
+	for (int k = 0; k < w->v->m->bands; k++) {
+		w->directional[k] = directional[k];
+		for (int p = 0; p < parts; p++) {
+			w->directional[k] += r.part[p].rest[k] / n;
+			lit[k] += r.part[p].lit[k] / n;
+		}
+		w->cut[k] = cut[k] + w->cut[k] / n;
+		w->error[k] += sqrt(w->blurred[k] / n);
+	}
+	w->aim.sum = 0;
+	put_light(&r, parts, n, lit);
+}
+
+void view_lobe_probe(struct view_walker *w, const struct view_branch *b,
+                     const struct view_lobe_seen *l, const double *coefficient, double scale,
+                     const struct view_branch *axial)
+{
+	struct view_branch next = *axial;
+	struct run r = { .w = w, .b = b, .l = l, .coefficient = coefficient, .next = &next,
+	                 .first = 2 * PROBES * b->index };
+	struct part one = { { 0 }, { 0 } };
+	double directional[BANDS_MAX], cut[BANDS_MAX];
+
+	memcpy(directional, w->directional, sizeof directional);
+	memcpy(cut, w->cut, sizeof cut);
+	next.lobes = next.straight = 1;
+	next.density = density(l, w->v->m->lobe, l->axis);
+	follow(&r, scale, &one);
+	for (uint32_t i = 0; i < 2 * PROBES; i++)
+		follow_sample(&r, i, &r.part[i / PROBES]);
+	for (int k = 0; k < w->v->m->bands; k++) {
+		double off[2], weight = b->weight[k] * coefficient[k];
+		for (int p = 0; p < 2; p++)
+			off[p] = one.rest[k] + one.lit[k] - (r.part[p].rest[k] + r.part[p].lit[k]) / PROBES;
+		w->probed[k] += weight * weight;
+		w->off[k] += off[0] * off[1];
+	}
+	memcpy(w->directional, directional, sizeof directional);
+	memcpy(w->cut, cut, sizeof cut);
+}
