@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <time.h>
 
-#include "../unit/brute.h"
+#include "tests/unit/fixtures/brute.h"
 #include "../unit/random_scene.h"
 #include "lib/occlusion/exchange.h"
 
