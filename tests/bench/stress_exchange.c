@@ -10,7 +10,7 @@
 #include <time.h>
 
 #include "tests/unit/fixtures/brute.h"
-#include "../unit/random_scene.h"
+#include "tests/unit/fixtures/random_scene.h"
 #include "lib/occlusion/exchange.h"
 
 static double seconds(void)
