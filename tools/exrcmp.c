@@ -104,7 +104,7 @@ static int pair_channels(const struct cli *c, const struct options *o, struct pi
 	if (!pairs->a || !pairs->b)
 		return -1;
 	for (int i = 0; i < a->channels; i++) {
-		int j = image_channel(b, a->name[i]);
+		int j = picture_image_channel(b, a->name[i]);
 
 		if (!in_layer(a->name[i], o->layer))
 			continue;
@@ -116,13 +116,13 @@ static int pair_channels(const struct cli *c, const struct options *o, struct pi
 		pairs->b[pairs->n++] = j;
 	}
 	for (int j = 0; j < b->channels; j++)
-		if (in_layer(b->name[j], o->layer) && image_channel(a, b->name[j]) < 0)
+		if (in_layer(b->name[j], o->layer) && picture_image_channel(a, b->name[j]) < 0)
 			cli_note(c, "channel %s is only in %s", b->name[j], o->file[1]);
 	if (pairs->n == 0)
 		return err_set(e, "%s: has no channel%s%s in common with %s", o->file[0],
 		               o->layer ? " of layer " : "", o->layer ? o->layer : "", o->file[1]);
-	pairs->colours = image_layer(a, o->layer, pairs->rgb_a) == 3 &&
-	                 image_layer(b, o->layer, pairs->rgb_b) == 3;
+	pairs->colours = picture_image_layer(a, o->layer, pairs->rgb_a) == 3 &&
+	                 picture_image_layer(b, o->layer, pairs->rgb_b) == 3;
 	return 0;
 }
 
@@ -130,7 +130,7 @@ static int read_pictures(const struct cli *c, const struct options *o, struct pi
                          struct err *e)
 {
 	for (int i = 0; i < 2; i++)
-		if (exr_file_read(o->file[i], &p->im[i], &p->info[i], e))
+		if (file_exr_read(o->file[i], &p->im[i], &p->info[i], e))
 			return -1;
 	if (p->im[0].width != p->im[1].width || p->im[0].height != p->im[1].height)
 		return err_set(e, "%s: is %d x %d pixels but %s is %d x %d; render both at one size",
@@ -149,10 +149,10 @@ static int make_mask(const struct options *o, struct pictures *p, struct err *e)
 	p->mask = mem_new((size_t)a->width * (size_t)a->height, 1, "mask", e);
 	if (!p->mask)
 		return -1;
-	if (o->no_emitters && (compare_mask_emitters(a, p->mask) & compare_mask_emitters(b, p->mask)))
+	if (o->no_emitters && (picture_compare_mask_emitters(a, p->mask) & picture_compare_mask_emitters(b, p->mask)))
 		return err_set(e, "%s: no layer tells where emitters are, nor in %s; "
 		               "use trace --layers emission", o->file[0], o->file[1]);
-	if (o->no_nothing && (compare_mask_nothing(a, p->mask) & compare_mask_nothing(b, p->mask)))
+	if (o->no_nothing && (picture_compare_mask_nothing(a, p->mask) & picture_compare_mask_nothing(b, p->mask)))
 		return err_set(e, "%s: no channel tells where nothing is seen, nor in %s; "
 		               "use trace --layers Z", o->file[0], o->file[1]);
 	return 0;
@@ -191,7 +191,7 @@ static json_t *to_json(const struct compare *d)
 	                 (json_int_t)(d->left_out + d->excluded));
 	for (int i = 0; i < COMPARE_PERCENTILES; i++) {
 		char name[32];
-		snprintf(name, sizeof name, "percentile_%d", compare_percentile[i]);
+		snprintf(name, sizeof name, "percentile_%d", picture_compare_percentile[i]);
 		json_object_set_new(j, name, number(d->percentile[i]));
 	}
 	return j;
@@ -211,7 +211,7 @@ static int compare_all(const struct options *o, const struct pictures *p,
 	if (!o->json)
 		print_header();
 	if (p->pairs.colours) {
-		compare_channels(a, p->pairs.rgb_a, b, p->pairs.rgb_b, 3, p->mask, worst, e);
+		picture_compare_channels(a, p->pairs.rgb_a, b, p->pairs.rgb_b, 3, p->mask, worst, e);
 		json_object_set_new(all, "rgb", to_json(worst));
 		if (!o->json)
 			print_row("RGB", worst);
@@ -219,7 +219,7 @@ static int compare_all(const struct options *o, const struct pictures *p,
 	for (int i = 0; i < p->pairs.n; i++) {
 		const char *name = a->name[p->pairs.a[i]];
 
-		compare_channels(a, &p->pairs.a[i], b, &p->pairs.b[i], 1, p->mask, &d, e);
+		picture_compare_channels(a, &p->pairs.a[i], b, &p->pairs.b[i], 1, p->mask, &d, e);
 		json_object_set_new(channels, name, to_json(&d));
 		if (!o->json)
 			print_row(name, &d);
@@ -241,17 +241,17 @@ static int write_heat(const struct options *o, const struct pictures *p, int arg
 {
 	struct image heat = { 0 };
 	struct exr_file_info info = { 0 };
-	char *history = history_append(exr_file_info_get(&p->info[0], EXR_FILE_HISTORY), argc,
-	                               argv, e);
+	char *history = file_history_append(file_exr_info_get(&p->info[0], EXR_FILE_HISTORY), argc,
+	                                    argv, e);
 	int status = -1;
 
-	if (history && exr_file_info_set(&info, EXR_FILE_HISTORY, history, e) == 0 &&
-	    compare_difference(&p->im[0], p->pairs.a, &p->im[1], p->pairs.b, p->pairs.n, &heat,
-	                       e) == 0)
-		status = exr_file_write(o->heat, &heat, &info, NULL, NULL, e);
+	if (history && file_exr_info_set(&info, EXR_FILE_HISTORY, history, e) == 0 &&
+	    picture_compare_difference(&p->im[0], p->pairs.a, &p->im[1], p->pairs.b, p->pairs.n, &heat,
+	                               e) == 0)
+		status = file_exr_write(o->heat, &heat, &info, NULL, NULL, e);
 	free(history);
-	exr_file_info_free(&info);
-	image_free(&heat);
+	file_exr_info_free(&info);
+	picture_image_free(&heat);
 	return status;
 }
 
@@ -289,8 +289,8 @@ int main(int argc, char **argv)
 	else
 		status = judge(&c, &o, &worst);
 	for (int i = 0; i < 2; i++) {
-		image_free(&p.im[i]);
-		exr_file_info_free(&p.info[i]);
+		picture_image_free(&p.im[i]);
+		file_exr_info_free(&p.info[i]);
 	}
 	free(p.pairs.a);
 	free(p.pairs.b);

@@ -49,8 +49,8 @@ static void parse_part(const struct cli *c, const char *text, struct ff_options 
 
 	if (sscanf(text, "%u/%u%c", &k, &n, &end) != 2 || k < 1 || k > n || n > 1000000)
 		cli_usage(c, "--part %s: a shard is K/N with 1 <= K <= N, such as 2/4", text);
-	o->part = k;
-	o->parts = n;
+	o->shard = k;
+	o->shards = n;
 }
 
 static void parse_word(const struct cli *c, const char *option, const char *text,
@@ -79,7 +79,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 	struct ff_options *o = &r->ff;
 
 	*o = (struct ff_options){ .points = 16, .emitter_gain = 8, .lobe_rays = 4096, .lobe_depth = 4, .depth = 256,
-	                          .seed = 1, .method = FF_AUTO, .evaluations = 50000, .part = 1, .parts = 1 };
+	                          .seed = 1, .method = FF_AUTO, .evaluations = 50000, .shard = 1, .shards = 1 };
 	while ((letter = cli_next(c, argc, argv)) != -1) {
 		switch (letter) {
 		case 'o': r->output = optarg; break;
@@ -132,7 +132,7 @@ static json_t *options_json(const struct ff_options *o)
 		"samples", (json_int_t)o->rays, "lobe_rays", (json_int_t)o->lobe_rays,
 		"depth", (json_int_t)o->depth, "seed", (json_int_t)o->seed,
 		"precision", o->f64 ? "f64" : "f32",
-		"part", (json_int_t)o->part, "parts", (json_int_t)o->parts);
+		"part", (json_int_t)o->shard, "parts", (json_int_t)o->shards);
 
 	if (o->method != FF_HEMICUBE)
 		json_object_set_new(j, "gather", json_integer(o->gather));
@@ -167,17 +167,17 @@ static json_t *report_json(const struct ff_stats *s)
 /* Everything the output depends on, so that an equal one need not be made again. */
 static void make_key(const struct cache_info *mesh, const char *chosen, char key[33])
 {
-	struct digest *d = digest_new();
+	struct digest *d = file_digest_new();
 
-	digest_string(d, "ffcalc " TWOPASS_VERSION " " REVISION_FF);
-	digest_string(d, mesh->geometry_id);
-	digest_string(d, chosen);
-	digest_end(d, key);
+	file_digest_string(d, "ffcalc " TWOPASS_VERSION " " REVISION_FF);
+	file_digest_string(d, mesh->geometry_id);
+	file_digest_string(d, chosen);
+	file_digest_end(d, key);
 }
 
 static int put(void *arg, const struct ff *batch, struct err *e)
 {
-	return ff_file_append(arg, batch, e);
+	return file_ff_append(arg, batch, e);
 }
 
 static void print_report(const struct ff_stats *s, const struct request *r, double seconds)
@@ -214,7 +214,7 @@ static void print_report(const struct ff_stats *s, const struct request *r, doub
 static int compute(struct cli *c, const struct request *r, const struct model *m,
                    struct cache_info *info, struct err *e)
 {
-	struct ff_writer *w = ff_file_create(r->output, m, r->ff.f64, r->ff.to_patches, e);
+	struct ff_writer *w = file_ff_create(r->output, m, r->ff.f64, r->ff.to_patches, e);
 	struct ff_sink sink = { put, w };
 	struct ff_stats stats;
 	struct ff whole = { 0 };
@@ -227,12 +227,12 @@ static int compute(struct cli *c, const struct request *r, const struct model *m
 	int bad = ff_build(m, &r->ff, &whole, &stats, &sink, &progress, e);
 	cli_progress_end(&bar);
 	if (bad) {
-		ff_file_abandon(w);
+		file_ff_abandon(w);
 	} else {
 		json_t *report = report_json(&stats);
 		info->report = json_dumps(report, JSON_COMPACT);
 		json_decref(report);
-		bad = ff_file_finish(w, &whole, info, e);
+		bad = file_ff_finish(w, &whole, info, e);
 	}
 	ff_free(&whole);
 	if (!bad && !c->quiet)
@@ -245,28 +245,28 @@ static int run(struct cli *c, const struct request *r, int argc, char **argv, st
 	struct model m = { 0 };
 	struct cache_info mesh = { 0 }, info = { 0 };
 	char key[33];
-	int bad = mesh_file_read(r->mesh, &m, &mesh, e);
+	int bad = file_mesh_read(r->mesh, &m, &mesh, e);
 
 	if (!bad) {
 		json_t *j = options_json(&r->ff);
 		info.options = json_dumps(j, JSON_COMPACT | JSON_SORT_KEYS);
 		json_decref(j);
 		make_key(&mesh, info.options, key);
-		if (cache_up_to_date(r->output, "twopass.ff", key)) {
-			int renamed = ff_file_rename(r->output, &m, e);
+		if (file_cache_up_to_date(r->output, "twopass.ff", key)) {
+			int renamed = file_ff_rename(r->output, &m, e);
 			bad = renamed < 0 ? -1 : 0;
 			if (!bad)
 				cli_note(c, "%s: %s", r->output, renamed ? "names replaced, form factors kept"
 				                                         : "up to date");
 		} else {
 			info.key = strdup(key);
-			info.history = history_append(mesh.history, argc, argv, e);
+			info.history = file_history_append(mesh.history, argc, argv, e);
 			bad = !info.history || !info.key || compute(c, r, &m, &info, e);
 		}
 	}
 	model_free(&m);
-	cache_info_free(&mesh);
-	cache_info_free(&info);
+	file_cache_info_free(&mesh);
+	file_cache_info_free(&info);
 	return bad;
 }
 

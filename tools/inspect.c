@@ -79,21 +79,21 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 
 static void content_free(struct content *x)
 {
-	container_close(x->container);
-	ff_file_close(&x->ff);
+	file_container_close(x->container);
+	file_ff_close(&x->ff);
 	solution_free(&x->solution);
 	model_free(&x->model);
-	cache_info_free(&x->info);
+	file_cache_info_free(&x->info);
 }
 
 /* Reads the whole file with all checks that other tools make. */
 static int read_content(const struct request *r, struct content *x, struct err *e)
 {
 	if (strcmp(x->format, "twopass.ff") == 0)
-		return ff_file_open(r->file, NULL, NULL, &x->ff, e);
+		return file_ff_open(r->file, NULL, NULL, &x->ff, e);
 	if (strcmp(x->format, "twopass.rad") == 0)
-		return rad_file_read(r->file, &x->model, &x->solution, &x->info, e);
-	return mesh_file_read(r->file, &x->model, &x->info, e);
+		return file_rad_read(r->file, &x->model, &x->solution, &x->info, e);
+	return file_mesh_read(r->file, &x->model, &x->info, e);
 }
 
 static int need_kind(const struct request *r, const struct content *x, const char *option,
@@ -131,11 +131,11 @@ static json_t *json_array_entry(const struct container_view *v)
 	struct array_stats s;
 	json_t *shape = json_array();
 
-	array_stats(v, &s);
+	file_array_stats(v, &s);
 	for (int d = 0; d < v->dims; d++)
 		json_array_append_new(shape, json_integer((json_int_t)v->shape[d]));
 	return json_pack("{s:s, s:s, s:o, s:o, s:o, s:o, s:I}", "name", v->name, "dtype",
-	                 dtype_name(v->type), "shape", shape, "min", json_number(s.min), "mean",
+	                 file_dtype_name(v->type), "shape", shape, "min", json_number(s.min), "mean",
 	                 json_number(s.mean), "max", json_number(s.max), "nans",
 	                 (json_int_t)s.nans);
 }
@@ -144,14 +144,14 @@ static json_t *json_overview(const struct container *c)
 {
 	json_t *meta = json_object(), *arrays = json_array();
 
-	for (size_t i = 0; i < container_metas(c); i++) {
-		const char *value, *key = container_meta_at(c, i, &value);
+	for (size_t i = 0; i < file_container_metas(c); i++) {
+		const char *value, *key = file_container_meta_at(c, i, &value);
 		if (!is_digest(key))
 			json_object_set_new(meta, key, meta_value(value));
 	}
-	for (size_t i = 0; i < container_arrays(c); i++)
-		json_array_append_new(arrays, json_array_entry(container_at(c, i)));
-	return json_pack("{s:s, s:o, s:o}", "file", container_path(c), "metadata", meta, "arrays",
+	for (size_t i = 0; i < file_container_arrays(c); i++)
+		json_array_append_new(arrays, json_array_entry(file_container_at(c, i)));
+	return json_pack("{s:s, s:o, s:o}", "file", file_container_path(c), "metadata", meta, "arrays",
 	                 arrays);
 }
 
@@ -212,21 +212,21 @@ static void print_array(const struct container_view *v)
 		n += (size_t)snprintf(shape + n, sizeof shape - n, "%s%" PRIu64, d ? "," : "[",
 		                      v->shape[d]);
 	snprintf(shape + n, sizeof shape - n, "%s", v->dims ? "]" : "[]");
-	array_stats(v, &s);
-	printf("%-28s %-3s %-16s %-24.17g %-24.17g %.17g\n", v->name, dtype_name(v->type), shape,
+	file_array_stats(v, &s);
+	printf("%-28s %-3s %-16s %-24.17g %-24.17g %.17g\n", v->name, file_dtype_name(v->type), shape,
 	       s.min, s.mean, s.max);
 }
 
 static void print_overview(const struct container *c)
 {
-	for (size_t i = 0; i < container_metas(c); i++) {
-		const char *value, *key = container_meta_at(c, i, &value);
+	for (size_t i = 0; i < file_container_metas(c); i++) {
+		const char *value, *key = file_container_meta_at(c, i, &value);
 		if (!is_digest(key))
 			print_meta(key, value);
 	}
 	printf("\n%-28s %-3s %-16s %-24s %-24s %s\n", "array", "", "shape", "min", "mean", "max");
-	for (size_t i = 0; i < container_arrays(c); i++)
-		print_array(container_at(c, i));
+	for (size_t i = 0; i < file_container_arrays(c); i++)
+		print_array(file_container_at(c, i));
 }
 
 /* ---- verify ---- */
@@ -238,9 +238,9 @@ static int run_checks(const struct request *r, struct content *x, struct verify 
 	if (read_content(r, x, e))
 		return -1;
 	if (x->ff.container)
-		return verify_ff(&x->ff.f, &x->ff.scene, v, e);
-	if (x->solution.direct)
-		verify_solution(&x->model, &x->solution, v);
+		return ff_verify(&x->ff.f, &x->ff.scene, v, e);
+	if (x->solution.irradiance.direct)
+		solution_verify(&x->model, &x->solution, v);
 	return 0;
 }
 
@@ -259,7 +259,7 @@ static json_t *json_checks(const struct verify *v)
 
 static void print_checks(const struct container *c, const struct verify *v)
 {
-	printf("digests, structure, ranges: good, %zu arrays\n", container_arrays(c));
+	printf("digests, structure, ranges: good, %zu arrays\n", file_container_arrays(c));
 	for (size_t i = 0; i < v->n; i++) {
 		const struct verify_item *item = &v->item[i];
 		printf("%s: %.17g%s%s", item->name, item->value, *item->unit ? " " : "",
@@ -308,7 +308,7 @@ static void csv_line(const struct content *x, size_t element_side, int solved)
 	const struct model *m = &x->model;
 	struct side_row row;
 
-	side_row(m, solved ? &x->solution : NULL, element_side, &row);
+	solution_side_row(m, solved ? &x->solution : NULL, element_side, &row);
 	printf("%" PRIu32 ",%c,%" PRIu32 ",", row.element, "fb"[row.side], row.patch);
 	print_csv(m->surface.name[row.surface], ",");
 	print_csv(m->material.name[row.material], "");
@@ -323,7 +323,7 @@ static void csv_line(const struct content *x, size_t element_side, int solved)
 
 static int is_modelled(const struct model *m, size_t element_side)
 {
-	return model_side_modelled(m, 2 * m->element_patch[element_side >> 1] +
+	return model_side_modelled(m, 2 * m->element.patch[element_side >> 1] +
 	                                  (uint32_t)(element_side & 1));
 }
 
@@ -332,11 +332,11 @@ static int print_sides(const struct request *r, struct content *x, struct err *e
 	if (need_kind(r, x, r->csv ? "--csv" : "--row", 0, e) || read_content(r, x, e))
 		return -1;
 	const struct model *m = &x->model;
-	size_t begin = r->csv ? 0 : (size_t)r->row, end = r->csv ? 2 * m->elements : begin + 1;
-	int solved = x->solution.direct != NULL;
-	if (end > 2 * m->elements)
+	size_t begin = r->csv ? 0 : (size_t)r->row, end = r->csv ? 2 * m->element.n : begin + 1;
+	int solved = x->solution.irradiance.direct != NULL;
+	if (end > 2 * m->element.n)
 		return err_set(e, "%s: there is no element-side %zu; the last is %zu", r->file, begin,
-		               2 * m->elements - 1);
+		               2 * m->element.n - 1);
 	if (!r->csv && !is_modelled(m, begin))
 		return err_set(e, "%s: element-side %zu is not modelled; it is the black back of a "
 		               "one-sided surface", r->file, begin);
@@ -360,9 +360,9 @@ static int print_row(const struct request *r, struct content *x, struct err *e)
 {
 	if (read_content(r, x, e))
 		return -1;
-	if ((size_t)r->row >= x->ff.f.rows)
+	if ((size_t)r->row >= x->ff.f.row.n)
 		return err_set(e, "%s: there is no row %ld; the file has %zu", r->file, r->row,
-		               x->ff.f.rows);
+		               x->ff.f.row.n);
 	return print_ff_row(&x->ff, (uint32_t)r->row, e);
 }
 
@@ -370,22 +370,22 @@ static int print_row(const struct request *r, struct content *x, struct err *e)
 
 static int write_npy(const struct request *r, const struct content *x, struct err *e)
 {
-	const struct container_view *v = container_find(x->container, r->npy);
+	const struct container_view *v = file_container_find(x->container, r->npy);
 
 	if (!v)
 		return err_set(e, "%s: there is no array %s; inspect %s lists them", r->file, r->npy,
 		               r->file);
-	return container_verify(x->container, v, e) ||
-	       npy_write(r->output ? r->output : "-", v, e) ? -1 : 0;
+	return file_container_verify(x->container, v, e) ||
+	       file_npy_write(r->output ? r->output : "-", v, e) ? -1 : 0;
 }
 
 static int inspect(const struct request *r, struct content *x, struct err *e)
 {
 	int matrix = r->matrix || (r->npy && strcmp(r->npy, PATCH_MATRIX) == 0);
 
-	if (!(x->container = container_open(r->file, NULL, e)))
+	if (!(x->container = file_container_open(r->file, NULL, e)))
 		return -1;
-	x->format = container_get_meta(x->container, "format");
+	x->format = file_container_get_meta(x->container, "format");
 	if (r->verify)
 		return verify(r, x, e);
 	if (matrix)

@@ -40,9 +40,9 @@ static const struct cli_option options[] = {
 
 struct request {
 	const char *scene, *output;
-	struct mesher_options mesher;
+	struct mesh_options mesher;
 	const char *solution;            /* to refine, or NULL */
-	struct mesher_refinement refine;
+	struct mesh_refinement refine;
 	struct gltf_options gltf;
 };
 
@@ -51,7 +51,7 @@ struct job {
 	const struct request *r;
 	struct model m;
 	struct gltf_report gltf;
-	struct mesher_report mesher;
+	struct mesh_report mesher;
 	struct cache_info info;
 	struct model old;                /* of the solution to refine */
 	struct solution s;
@@ -60,10 +60,10 @@ struct job {
 };
 
 /* A length in metres, in percent of the scene, or `inf`. */
-static struct mesher_size parse_size(const struct cli *c, const char *option, char *text)
+static struct mesh_size parse_size(const struct cli *c, const char *option, char *text)
 {
 	size_t n = strlen(text);
-	struct mesher_size s = { 0, n > 0 && text[n - 1] == '%' };
+	struct mesh_size s = { 0, n > 0 && text[n - 1] == '%' };
 
 	if (s.relative)
 		text[n - 1] = 0;
@@ -90,8 +90,8 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 {
 	int letter, refines = 0;
 
-	r->refine = (struct mesher_refinement){ .02, { .0025, 1 }, 1000000 };
-	r->mesher = (struct mesher_options){ .patch = { .05, 1 }, .element = { .04, 1 },
+	r->refine = (struct mesh_refinement){ .02, { .0025, 1 }, 1000000 };
+	r->mesher = (struct mesh_options){ .patch = { .05, 1 }, .element = { .04, 1 },
 		                             .element_within_patch = 1, .normal_cone = 20 };
 	r->gltf = GLTF_OPTIONS_DEFAULT;
 	while ((letter = cli_next(c, argc, argv)) != -1) {
@@ -163,7 +163,7 @@ static json_t *length_json(double x)
 	return isfinite(x) ? json_real(x) : json_string("inf");
 }
 
-static json_t *size_json(struct mesher_size s)
+static json_t *size_json(struct mesh_size s)
 {
 	return json_pack("{s:o, s:s}", "value", length_json(s.value), "of",
 	                 s.relative ? "scene" : "metre");
@@ -199,7 +199,7 @@ static json_t *notes_json(const struct gltf_report *r)
 	return list;
 }
 
-static json_t *cleaned_json(const struct mesher_surface *s)
+static json_t *cleaned_json(const struct mesh_surface *s)
 {
 	return json_pack("{s:I, s:I, s:I, s:I}", "degenerate", (json_int_t)s->degenerate,
 	                 "duplicate", (json_int_t)s->duplicate,
@@ -210,7 +210,7 @@ static json_t *cleaned_json(const struct mesher_surface *s)
 /* What was cleaned where, surfaces without anything left out. */
 static json_t *surfaces_json(const struct job *j)
 {
-	static const struct mesher_surface clean;
+	static const struct mesh_surface clean;
 	json_t *object = json_object();
 
 	for (size_t i = 0; i < j->mesher.surfaces; i++)
@@ -220,7 +220,7 @@ static json_t *surfaces_json(const struct job *j)
 	return object;
 }
 
-static json_t *materials_json(const struct mesher_report *r)
+static json_t *materials_json(const struct mesh_report *r)
 {
 	return json_pack("{s:I, s:I, s:I, s:I, s:I, s:I}", "used", (json_int_t)r->materials,
 	                 "two_sided", (json_int_t)r->two_sided,
@@ -229,14 +229,14 @@ static json_t *materials_json(const struct mesher_report *r)
 	                 "transmitting", (json_int_t)r->transmitting);
 }
 
-static json_t *imprint_json(const struct mesher_report *r)
+static json_t *imprint_json(const struct mesh_report *r)
 {
 	return json_pack("{s:I, s:I, s:I, s:I}", "cut", (json_int_t)r->cut, "lines",
 	                 (json_int_t)r->lines, "fine_contacts", (json_int_t)r->fine_contacts,
 	                 "covered", (json_int_t)r->covered);
 }
 
-static json_t *pieces_json(const struct mesher_report *r)
+static json_t *pieces_json(const struct mesh_report *r)
 {
 	return json_pack("{s:I, s:I, s:I, s:I}", "connected", (json_int_t)r->components,
 	                 "closed", (json_int_t)r->closed_components,
@@ -244,7 +244,7 @@ static json_t *pieces_json(const struct mesher_report *r)
 	                 "crowded_edges", (json_int_t)r->crowded_edges);
 }
 
-static json_t *refined_json(const struct mesher_report *r)
+static json_t *refined_json(const struct mesh_report *r)
 {
 	return json_pack("{s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:f}",
 	                 "elements", (json_int_t)r->elements_before,
@@ -258,14 +258,14 @@ static json_t *refined_json(const struct mesher_report *r)
 
 static char *report_text(const struct job *j, struct err *e)
 {
-	const struct mesher_report *r = &j->mesher;
+	const struct mesh_report *r = &j->mesher;
 	json_t *o = json_pack("{s:i, s:o, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:o, s:o, s:f, s:f,"
 	                      " s:o, s:I, s:o, s:o, s:o, s:o}",
 	                      "bands", j->m.bands, "materials", materials_json(r),
 	                      "surfaces", (json_int_t)j->m.surface.n,
-	                      "triangles", (json_int_t)j->m.triangles,
-	                      "elements", (json_int_t)j->m.elements,
-	                      "patches", (json_int_t)j->m.patches,
+	                      "triangles", (json_int_t)j->m.triangle.n,
+	                      "elements", (json_int_t)j->m.element.n,
+	                      "patches", (json_int_t)j->m.patch.n,
 	                      "planar_patches", (json_int_t)r->planar_patches,
 	                      "largest_patch", (json_int_t)r->largest_patch,
 	                      "diagonal", r->diagonal,
@@ -287,14 +287,14 @@ static char *report_text(const struct job *j, struct err *e)
 static char *make_key(const struct job *j)
 {
 	char hex[33];
-	struct digest *d = digest_new();
+	struct digest *d = file_digest_new();
 
-	digest_string(d, "mesh " TWOPASS_VERSION " " CACHE_VERSION " " REVISION_MESH);
-	digest_string(d, j->info.options);
-	digest_string(d, j->gltf.digest);
+	file_digest_string(d, "mesh " TWOPASS_VERSION " " CACHE_VERSION " " REVISION_MESH);
+	file_digest_string(d, j->info.options);
+	file_digest_string(d, j->gltf.digest);
 	if (j->r->solution)
-		digest_string(d, j->old_info.key ? j->old_info.key : "");
-	digest_end(d, hex);
+		file_digest_string(d, j->old_info.key ? j->old_info.key : "");
+	file_digest_end(d, hex);
 	return strdup(hex);
 }
 
@@ -314,13 +314,13 @@ static void print_size(FILE *f, const char *what, double metres)
 
 static void print_counts(FILE *f, const struct job *j)
 {
-	const struct mesher_report *r = &j->mesher;
+	const struct mesh_report *r = &j->mesher;
 	const struct model *m = &j->m;
 
 	fprintf(f, "scene       %zu surface%s, %zu light%s, %zu camera%s, %.6g m across\n",
 	        m->surface.n, plural(m->surface.n), m->light.n, plural(m->light.n), m->cameras,
 	        plural(m->cameras), r->diagonal);
-	fprintf(f, "triangles   %zu", m->triangles);
+	fprintf(f, "triangles   %zu", m->triangle.n);
 	if (r->total.degenerate)
 		fprintf(f, ", %u without area dropped", r->total.degenerate);
 	if (r->total.duplicate)
@@ -342,9 +342,9 @@ static void print_counts(FILE *f, const struct job *j)
 		        "error       %.3g relative (%.3g of it from patches), %.3g expected now",
 		        r->marked, r->elements_before, r->patches_marked, r->patches_before,
 		        r->patches_for_lobes, r->error_before, r->patch_error_before, r->error_expected);
-	fprintf(f, "\nelements    %zu", m->elements);
+	fprintf(f, "\nelements    %zu", m->element.n);
 	print_size(f, "edges", r->element_size);
-	fprintf(f, "patches     %zu, %zu of them plane", m->patches, r->planar_patches);
+	fprintf(f, "patches     %zu, %zu of them plane", m->patch.n, r->planar_patches);
 	print_size(f, "sides", r->patch_size);
 	fprintf(f, "area        %.6g m2 front, %.6g m2 back\n", r->area_front, r->area_back);
 	fprintf(f, "closed      %zu of %zu connected piece%s; %zu open edge%s, %zu with more than "
@@ -354,7 +354,7 @@ static void print_counts(FILE *f, const struct job *j)
 
 static void print_modelled(FILE *f, const struct job *j)
 {
-	const struct mesher_report *r = &j->mesher;
+	const struct mesh_report *r = &j->mesher;
 	const struct model *m = &j->m;
 
 	fprintf(f, "materials   %zu: %zu emit, %zu two-sided, %zu transmit, %zu with lobes, "
@@ -383,11 +383,11 @@ static void print_modelled(FILE *f, const struct job *j)
 /* Every surface that lost triangles or whose winding is mixed. */
 static void warn_surfaces(const struct job *j)
 {
-	const struct mesher_report *r = &j->mesher;
+	const struct mesh_report *r = &j->mesher;
 
 	for (size_t i = 0; i < r->surfaces; i++) {
 		const char *name = j->m.surface.name[i];
-		const struct mesher_surface *s = &r->surface[i];
+		const struct mesh_surface *s = &r->surface[i];
 		if (s->degenerate)
 			cli_note(j->cli, "%s: %s: dropped %u triangle%s without area", j->r->scene,
 			         name, s->degenerate, plural(s->degenerate));
@@ -418,13 +418,13 @@ static int divide(struct job *j, struct err *e)
 {
 	struct cli_progress bar;
 	struct progress progress = cli_progress_begin(&bar, j->cli, "meshing");
-	struct mesher_options o = j->r->mesher;
+	struct mesh_options o = j->r->mesher;
 	struct err inner = { 0 };
 
 	o.progress = &progress;
-	int status = j->r->solution ? mesher_refine(&j->m, &o, &j->old, &j->s, &j->r->refine,
-	                                            &j->origin, &j->mesher, &inner)
-	                            : mesher_run(&j->m, &o, &j->mesher, &inner);
+	int status = j->r->solution ? mesh_refine(&j->m, &o, &j->old, &j->s, &j->r->refine,
+	                                          &j->origin, &j->mesher, &inner)
+	                            : mesh_run(&j->m, &o, &j->mesher, &inner);
 	cli_progress_end(&bar);
 	return status ? err_set(e, "%s: %s", j->r->scene, inner.text) : 0;
 }
@@ -432,11 +432,11 @@ static int divide(struct job *j, struct err *e)
 static int write_mesh(struct job *j, int argc, char **argv, struct err *e)
 {
 	j->info.report = report_text(j, e);
-	j->info.history = history_append(NULL, argc, argv, e);
+	j->info.history = file_history_append(NULL, argc, argv, e);
 	if (!j->info.report || !j->info.history)
 		return -1;
-	cache_ids(&j->m, &j->info);
-	return mesh_file_write(j->r->output, &j->m, &j->info, e);
+	file_cache_ids(&j->m, &j->info);
+	return file_mesh_write(j->r->output, &j->m, &j->info, e);
 }
 
 static void print_report(const struct job *j)
@@ -457,12 +457,12 @@ static int work(struct job *j, int argc, char **argv, struct err *e)
 		return -1;
 	for (size_t i = 0; i < j->gltf.notes; i++)
 		cli_note(j->cli, "%s: %s", j->r->scene, j->gltf.note[i]);
-	if (j->r->solution && rad_file_read(j->r->solution, &j->old, &j->s, &j->old_info, e))
+	if (j->r->solution && file_rad_read(j->r->solution, &j->old, &j->s, &j->old_info, e))
 		return -1;
 	j->info.options = options_text(j->r, e);
 	if (!j->info.options || !(j->info.key = make_key(j)))
 		return err_set(e, "out of memory for options");
-	if (!is_stdout(j) && cache_up_to_date(j->r->output, FORMAT, j->info.key)) {
+	if (!is_stdout(j) && file_cache_up_to_date(j->r->output, FORMAT, j->info.key)) {
 		cli_note(j->cli, "%s: up to date", j->r->output);
 		return 0;
 	}
@@ -490,10 +490,10 @@ int main(int argc, char **argv)
 	cli_signals();
 	parse(&c, argc, argv, &r);
 	int status = work(&j, argc, argv, &e) ? cli_fail(&c, &e) : 0;
-	mesher_report_free(&j.mesher);
+	mesh_report_free(&j.mesher);
 	gltf_report_free(&j.gltf);
-	cache_info_free(&j.info);
-	cache_info_free(&j.old_info);
+	file_cache_info_free(&j.info);
+	file_cache_info_free(&j.old_info);
 	solution_free(&j.s);
 	model_free(&j.old);
 	model_free(&j.m);

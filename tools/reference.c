@@ -54,7 +54,7 @@ struct reference {
 
 static void compression(struct reference *r, const char *text)
 {
-	int method = exr_file_compression_by_name(text);
+	int method = file_exr_compression_by_name(text);
 
 	if (method < 0)
 		cli_usage(&r->cli, "--compression: '%s' is none of auto, zip, zips, piz, rle, none", text);
@@ -69,7 +69,7 @@ static void take_option(struct reference *r, int letter)
 	case 'c': r->camera = optarg; break;
 	case 'o': r->output = optarg; break;
 	case 's':
-		if (camera_parse_size(optarg, &r->width, &r->height))
+		if (picture_camera_parse_size(optarg, &r->width, &r->height))
 			cli_usage(c, "--size: '%s' is not a size such as 640x480", optarg);
 		break;
 	case OPT_IRRADIANCE: r->irradiance = 1; break;
@@ -116,15 +116,15 @@ static void picture_key(struct reference *r, const char *content)
 {
 	const int64_t number[] = { r->frame.width, r->frame.height, r->o.samples,
 		(int64_t)r->o.seed, (int64_t)r->exr.compression, r->o.centre };
-	struct digest *d = digest_new();
+	struct digest *d = file_digest_new();
 	char camera[33];
 
-	cache_camera_id(r->view, camera);
-	digest_string(d, "twopass.reference " TWOPASS_VERSION " " REVISION_VIEW);
-	digest_string(d, content);
-	digest_string(d, camera);
-	digest_bytes(d, number, sizeof number);
-	digest_end(d, r->key);
+	file_cache_camera_id(r->view, camera);
+	file_digest_string(d, "twopass.reference " TWOPASS_VERSION " " REVISION_VIEW);
+	file_digest_string(d, content);
+	file_digest_string(d, camera);
+	file_digest_bytes(d, number, sizeof number);
+	file_digest_end(d, r->key);
 }
 
 static int choose_view(struct reference *r, const char *content, struct err *e)
@@ -132,13 +132,13 @@ static int choose_view(struct reference *r, const char *content, struct err *e)
 	struct err why = { 0 };
 	int i = !r->camera && r->m.cameras == 1
 	      ? 0 /* a scene's only camera need not be named */
-	      : camera_find(&r->m, r->camera ? r->camera : "", &why);
+	      : picture_camera_find(&r->m, r->camera ? r->camera : "", &why);
 
 	if (i < 0)
 		return err_set(e, "%s: %s%s", r->mesh, r->camera ? "" : "a camera is needed (-c); ",
 		               why.text);
 	r->view = &r->m.camera[i];
-	if (camera_frame(r->view, r->width, r->height, &r->frame, e))
+	if (picture_camera_frame(r->view, r->width, r->height, &r->frame, e))
 		return -1;
 	picture_key(r, content);
 	return 0;
@@ -146,14 +146,14 @@ static int choose_view(struct reference *r, const char *content, struct err *e)
 
 static int read_scene(struct reference *r, struct err *e)
 {
-	struct container *c = container_open(r->mesh, "twopass.mesh", e);
+	struct container *c = file_container_open(r->mesh, "twopass.mesh", e);
 	char content[33];
 
 	if (!c)
 		return -1;
-	container_digest(c, content);
-	container_close(c);
-	if (mesh_file_read(r->mesh, &r->m, &r->info, e))
+	file_container_digest(c, content);
+	file_container_close(c);
+	if (file_mesh_read(r->mesh, &r->m, &r->info, e))
 		return -1;
 	return r->irradiance ? 0 : choose_view(r, content, e);
 }
@@ -183,22 +183,22 @@ static int describe(const struct reference *r, double relative, const char *hist
 	         r->o.samples, r->o.seed, error);
 	info->white_luminance = 1;
 	info->has_world_to_camera = 1;
-	camera_world_to_camera(&r->frame, info->world_to_camera);
-	return exr_file_info_set(info, EXR_FILE_CAMERA, r->view->name, e) ||
-	       exr_file_info_set(info, EXR_FILE_HISTORY, history, e) ||
-	       exr_file_info_set(info, EXR_FILE_KEY, r->key, e) ||
-	       exr_file_info_set(info, "statistics", statistics, e) ? -1 : 0;
+	picture_camera_world_to_camera(&r->frame, info->world_to_camera);
+	return file_exr_info_set(info, EXR_FILE_CAMERA, r->view->name, e) ||
+	       file_exr_info_set(info, EXR_FILE_HISTORY, history, e) ||
+	       file_exr_info_set(info, EXR_FILE_KEY, r->key, e) ||
+	       file_exr_info_set(info, "statistics", statistics, e) ? -1 : 0;
 }
 
 static int write_picture(const struct reference *r, double relative, const struct image *im,
                          int argc, char **argv, struct err *e)
 {
 	struct exr_file_info info = { 0 };
-	char *history = history_append(r->info.history, argc, argv, e);
+	char *history = file_history_append(r->info.history, argc, argv, e);
 	int bad = !history || describe(r, relative, history, &info, e) ||
-	          exr_file_write(r->output, im, &info, &r->exr, NULL, e);
+	          file_exr_write(r->output, im, &info, &r->exr, NULL, e);
 
-	exr_file_info_free(&info);
+	file_exr_info_free(&info);
 	free(history);
 	return bad ? -1 : 0;
 }
@@ -227,7 +227,7 @@ static int make_picture(const struct reference *r, int argc, char **argv, struct
 	cli_progress_end(&bar);
 	double seconds = cli_seconds() - begun;
 	bad = bad || write_picture(r, relative, &im, argc, argv, e);
-	image_free(&im);
+	picture_image_free(&im);
 	if (bad)
 		return -1;
 	report_picture(r, relative, seconds);
@@ -269,13 +269,13 @@ static void put_table(FILE *f, const struct model *m, const struct pathtrace_irr
 	for (size_t b = 0; b < bands; b++)
 		fprintf(f, ",SE_%zu", b);
 	putc('\n', f);
-	for (size_t row = 0; row < 2 * m->elements; row++) {
-		uint32_t patch = m->element_patch[row / 2];
+	for (size_t row = 0; row < 2 * m->element.n; row++) {
+		uint32_t patch = m->element.patch[row / 2];
 		if (!model_side_modelled(m, 2 * patch + (uint32_t)(row % 2)))
 			continue;
 		fprintf(f, "%zu,%s,%" PRIu32 ",", row / 2, row % 2 ? "back" : "front", patch);
-		put_name(f, m->surface.name[m->patch_surface[patch]]);
-		fprintf(f, ",%.17g", m->element_area[row / 2]);
+		put_name(f, m->surface.name[m->patch.surface[patch]]);
+		fprintf(f, ",%.17g", m->element.area[row / 2]);
 		for (size_t b = 0; b < bands; b++)
 			fprintf(f, ",%.17g", h->h[row * bands + b]);
 		for (size_t b = 0; b < bands; b++)
@@ -298,7 +298,7 @@ static int write_table(const struct reference *r, const struct pathtrace_irradia
 	bad = ferror(f);
 	bad |= fclose(f);
 	bad = bad ? err_set(e, "%s: out of memory", r->output)
-	          : atomic_file_put(r->output, text, length, e);
+	          : file_atomic_put(r->output, text, length, e);
 	free(text);
 	return bad;
 }
@@ -340,11 +340,11 @@ static int run(struct reference *r, int argc, char **argv, struct err *e)
 {
 	if (read_scene(r, e))
 		return -1;
-	if (!r->irradiance && exr_file_up_to_date(r->output, r->key)) {
+	if (!r->irradiance && file_exr_up_to_date(r->output, r->key)) {
 		cli_note(&r->cli, "%s: up to date", r->output);
 		return 0;
 	}
-	if (atomic_file_check(r->output, e) || prepare(r, e) ||
+	if (file_atomic_check(r->output, e) || prepare(r, e) ||
 	    (r->irradiance ? make_irradiance(r, e) : make_picture(r, argc, argv, e)))
 		return -1;
 	cli_detail(&r->cli, "peak memory %.0f MB", cli_peak_megabytes());
@@ -370,7 +370,7 @@ int main(int argc, char **argv)
 		status = cli_fail(&r.cli, &e);
 	pathtrace_free(r.tracer);
 	ray_scene_free(r.rays);
-	cache_info_free(&r.info);
+	file_cache_info_free(&r.info);
 	model_free(&r.m);
 	return cli_finish(&r.cli, status);
 }

@@ -110,10 +110,10 @@ static int open_inputs(struct job *j, struct err *e)
 	j->file = mem_new(r->shards, sizeof *j->file, "form factor files", e);
 	j->ff = mem_new(r->shards, sizeof *j->ff, "form factor files", e);
 	j->name = mem_new(r->shards, sizeof *j->name, "form factor files", e);
-	if (!j->file || !j->ff || !j->name || mesh_file_read(r->mesh, &j->m, &j->mesh, e))
+	if (!j->file || !j->ff || !j->name || file_mesh_read(r->mesh, &j->m, &j->mesh, e))
 		return -1;
 	for (size_t i = 0; i < r->shards; i++) {
-		if (ff_file_open(r->ff[i], &j->m, &j->mesh, &j->file[i], e))
+		if (file_ff_open(r->ff[i], &j->m, &j->mesh, &j->file[i], e))
 			return -1;
 		j->name[i] = r->ff[i];
 	}
@@ -124,22 +124,22 @@ static int open_inputs(struct job *j, struct err *e)
 /* Everything the solution depends on; cameras are looked after apart. */
 static void make_key(const struct job *j, char key[33])
 {
-	struct digest *d = digest_new();
+	struct digest *d = file_digest_new();
 	const struct model *m = &j->m;
 
-	digest_string(d, "shoot " TWOPASS_VERSION " " REVISION_RAD);
-	digest_string(d, j->mesh.geometry_id);
-	digest_string(d, j->mesh.material_id);
+	file_digest_string(d, "shoot " TWOPASS_VERSION " " REVISION_RAD);
+	file_digest_string(d, j->mesh.geometry_id);
+	file_digest_string(d, j->mesh.material_id);
 	for (size_t i = 0; i < m->surface.n; i++)
-		digest_string(d, m->surface.name[i]);
+		file_digest_string(d, m->surface.name[i]);
 	for (size_t i = 0; i < m->material.n; i++)
-		digest_string(d, m->material.name[i]);
-	digest_bytes(d, m->triangle_uv, 6 * m->triangles * sizeof *m->triangle_uv);
-	digest_bytes(d, m->triangle_normal, 9 * m->triangles * sizeof *m->triangle_normal);
+		file_digest_string(d, m->material.name[i]);
+	file_digest_bytes(d, m->triangle.uv, 6 * m->triangle.n * sizeof *m->triangle.uv);
+	file_digest_bytes(d, m->triangle.normal, 9 * m->triangle.n * sizeof *m->triangle.normal);
 	for (size_t i = 0; i < j->r->shards; i++)
-		digest_string(d, j->file[i].info.key ? j->file[i].info.key : "");
-	digest_string(d, j->info.options);
-	digest_end(d, key);
+		file_digest_string(d, j->file[i].info.key ? j->file[i].info.key : "");
+	file_digest_string(d, j->info.options);
+	file_digest_end(d, key);
 }
 
 static char *options_text(const struct request *r)
@@ -171,26 +171,26 @@ static int kept(struct job *j, const char *key, struct err *e)
 	struct cache_info info = { 0 };
 	int same_cameras, status;
 
-	if (!cache_up_to_date(j->r->output, "twopass.rad", key) ||
-	    !(c = container_open(j->r->output, "twopass.rad", &ignored)))
+	if (!file_cache_up_to_date(j->r->output, "twopass.rad", key) ||
+	    !(c = file_container_open(j->r->output, "twopass.rad", &ignored)))
 		return 0;
-	const char *camera_id = container_get_meta(c, "camera_id");
+	const char *camera_id = file_container_get_meta(c, "camera_id");
 	same_cameras = camera_id && strcmp(camera_id, j->mesh.camera_id) == 0;
-	container_close(c);
+	file_container_close(c);
 	if (same_cameras) {
 		cli_note(j->cli, "%s: up to date", j->r->output);
 		return 1;
 	}
-	if (rad_file_read(j->r->output, &old, &s, &info, &ignored))
+	if (file_rad_read(j->r->output, &old, &s, &info, &ignored))
 		return 0;
 	free(info.history);
 	info.history = strdup(j->info.history);
-	status = rad_file_write(j->r->output, &j->m, &s, &info, e);
+	status = file_rad_write(j->r->output, &j->m, &s, &info, e);
 	if (status == 0)
 		cli_note(j->cli, "%s: cameras replaced, solution kept", j->r->output);
 	model_free(&old);
 	solution_free(&s);
-	cache_info_free(&info);
+	file_cache_info_free(&info);
 	return status ? -1 : 1;
 }
 
@@ -198,7 +198,7 @@ static int kept(struct job *j, const char *key, struct err *e)
 static int same_groups(const struct job *j, struct err *e)
 {
 	struct solution want = { .bands = j->m.bands };
-	int same = light_groups_set(&want, &j->m, j->r->light_groups, e) == 0 &&
+	int same = radiosity_groups_set(&want, &j->m, j->r->light_groups, e) == 0 &&
 	           want.groups == j->s.groups;
 
 	for (size_t g = 0; same && g < want.groups; g++)
@@ -214,7 +214,7 @@ static int resume(struct job *j, struct err *e)
 	struct cache_info info = { 0 };
 	const char *path = j->r->output;
 
-	if (rad_file_read(path, &old, &j->s, &info, e))
+	if (file_rad_read(path, &old, &j->s, &info, e))
 		return -1;
 	if (strcmp(info.geometry_id, j->mesh.geometry_id) ||
 	    strcmp(info.material_id, j->mesh.material_id))
@@ -224,7 +224,7 @@ static int resume(struct job *j, struct err *e)
 	else if (!same_groups(j, e))
 		err_set(e, "%s: has other light groups; run shoot without --resume", path);
 	model_free(&old);
-	cache_info_free(&info);
+	file_cache_info_free(&info);
 	return e->set ? -1 : 0;
 }
 
@@ -255,12 +255,12 @@ static int solve(struct job *j, struct err *e)
 	struct cli_progress bar;
 	double t0 = cli_seconds(), t1, t2, t3;
 
-	if (transport_init(&j->t, &j->m, j->ff, j->name, j->r->shards, j->cli->threads, e))
+	if (radiosity_transport_init(&j->t, &j->m, j->ff, j->name, j->r->shards, j->cli->threads, e))
 		return -1;
 	if (j->r->resume && access(j->r->output, F_OK) == 0) {
 		if (resume(j, e))
 			return -1;
-	} else if (solution_begin(&j->s, &j->m, &j->t, j->r->light_groups, e)) {
+	} else if (radiosity_begin(&j->s, &j->m, &j->t, j->r->light_groups, e)) {
 		return -1;
 	}
 	t1 = cli_seconds();
@@ -270,10 +270,10 @@ static int solve(struct job *j, struct err *e)
 	if (bad)
 		return -1;
 	t2 = cli_seconds();
-	if (radiosity_gather(&j->s, &j->t, j->cli->threads, &j->report, e))
+	if (radiosity_element_irradiance(&j->s, &j->t, j->cli->threads, &j->report, e))
 		return -1;
 	t3 = cli_seconds();
-	if (discretisation_estimate(&j->m, &j->s, j->cli->threads, e))
+	if (interp_discretisation(&j->m, &j->s, j->cli->threads, e))
 		return -1;
 	j->prepare_seconds = t1 - t0;
 	j->solve_seconds = t2 - t1;
@@ -319,8 +319,8 @@ static char *report_text(const struct job *j)
 	              "unshot", r->unshot, "truncation_bound", number(r->bound),
 	              "guessed_directions", r->guessed, "ledger_residual", number(r->residual),
 	              "mean_error", solution_mean_error(&j->m, &j->s),
-	              "sampling", solution_relative_rms(&j->m, &j->s, j->s.error),
-	              "discretisation", solution_relative_rms(&j->m, &j->s, j->s.discretisation));
+	              "sampling", solution_relative_rms(&j->m, &j->s, j->s.error.sampling),
+	              "discretisation", solution_relative_rms(&j->m, &j->s, j->s.error.discretisation));
 	text = json_dumps(o, JSON_COMPACT);
 	json_decref(o);
 	return text;
@@ -360,9 +360,9 @@ static void print_report(const struct job *j)
 		fprintf(out, "truncation    no finite bound\n");
 	fprintf(out, "sampling      %.3g relative standard error of irradiance, mean over area; "
 	        "%.3g rms\n", solution_mean_error(&j->m, s),
-	        solution_relative_rms(&j->m, s, s->error));
+	        solution_relative_rms(&j->m, s, s->error.sampling));
 	fprintf(out, "elements      %.3g relative error of irradiance between elements "
-	        "(estimate), rms over area\n", solution_relative_rms(&j->m, s, s->discretisation));
+	        "(estimate), rms over area\n", solution_relative_rms(&j->m, s, s->error.discretisation));
 	if (r->guessed > 0)
 		fprintf(out, "directions    %.3g of what is emitted used the nearest known direction\n",
 		       r->guessed);
@@ -383,7 +383,7 @@ static int make(struct job *j, struct err *e)
 	if (bad)
 		return -1;
 	j->info.report = report_text(j);
-	return rad_file_write(j->r->output, &j->m, &j->s, &j->info, e);
+	return file_rad_write(j->r->output, &j->m, &j->s, &j->info, e);
 }
 
 static int run(struct job *j, int argc, char **argv, struct err *e)
@@ -392,10 +392,10 @@ static int run(struct job *j, int argc, char **argv, struct err *e)
 	int done;
 
 	j->begun = cli_seconds();
-	if (atomic_file_check(j->r->output, e) || open_inputs(j, e))
+	if (file_atomic_check(j->r->output, e) || open_inputs(j, e))
 		return -1;
 	j->info.options = options_text(j->r);
-	j->info.history = history_append(j->file[0].info.history, argc, argv, e);
+	j->info.history = file_history_append(j->file[0].info.history, argc, argv, e);
 	if (!j->info.history)
 		return -1;
 	make_key(j, key);
@@ -413,16 +413,16 @@ static int run(struct job *j, int argc, char **argv, struct err *e)
 
 static void job_free(struct job *j)
 {
-	transport_free(&j->t);
+	radiosity_transport_free(&j->t);
 	solution_free(&j->s);
 	for (size_t i = 0; j->file && i < j->r->shards; i++)
-		ff_file_close(&j->file[i]);
+		file_ff_close(&j->file[i]);
 	free(j->file);
 	free(j->ff);
 	free(j->name);
 	model_free(&j->m);
-	cache_info_free(&j->mesh);
-	cache_info_free(&j->info);
+	file_cache_info_free(&j->mesh);
+	file_cache_info_free(&j->info);
 }
 
 int main(int argc, char **argv)

@@ -111,7 +111,7 @@ static int find_layer(const struct options *o, const struct image *im, int chann
 {
 	char names[512] = "";
 
-	if (image_layer(im, o->layer, channel))
+	if (picture_image_layer(im, o->layer, channel))
 		return 0;
 	if (!o->layer && im->channels == 1) {
 		channel[0] = channel[1] = channel[2] = 0;
@@ -132,25 +132,25 @@ static int render(const struct cli *c, struct options *o, const struct image *im
 {
 	size_t odd, lit;
 
-	if (canvas_new(canvas, im->width, im->height, e))
+	if (picture_canvas_new(canvas, im->width, im->height, e))
 		return -1;
 	if (o->false_colour) {
 		struct err why = { 0 };
 
-		if (tonemap_scale(im, channel, &o->scale, &why))
+		if (picture_tonemap_scale(im, channel, &o->scale, &why))
 			return err_set(e, "%s: %s", o->input, why.text);
 		cli_note(c, "%s scale from %g to %g", o->scale.logarithmic ? "logarithmic" : "linear",
 		         o->scale.min, o->scale.max);
-		odd = tonemap_false_colour(im, channel, &o->scale, canvas);
-		if (!o->no_legend && legend_append(canvas, &o->scale, e))
+		odd = picture_tonemap_false_colour(im, channel, &o->scale, canvas);
+		if (!o->no_legend && picture_legend_append(canvas, &o->scale, e))
 			return -1;
 	} else {
 		if (o->automatic) {
-			o->curve.exposure = tonemap_exposure(im, channel, &lit);
+			o->curve.exposure = picture_tonemap_exposure(im, channel, &lit);
 			cli_note(c, "exposure %+.2f EV%s", o->curve.exposure,
 			         lit ? "" : " (no pixel is lit)");
 		}
-		odd = tonemap_curve(im, channel, &o->curve, canvas);
+		odd = picture_tonemap_curve(im, channel, &o->curve, canvas);
 	}
 	if (odd)
 		cli_warn(c, "%s: %zu pixels are infinite or not a number; they are shown in magenta",
@@ -166,8 +166,8 @@ static int write_png(const struct options *o, const struct canvas *canvas,
 	int status = -1;
 
 	if (rgb) {
-		canvas_quantise(canvas, o->bits, rgb);
-		status = png_file_write(o->output, canvas->width, canvas->height, o->bits, rgb,
+		picture_canvas_quantise(canvas, o->bits, rgb);
+		status = file_png_write(o->output, canvas->width, canvas->height, o->bits, rgb,
 		                        history, e);
 	}
 	free(rgb);
@@ -189,15 +189,15 @@ int main(int argc, char **argv)
 
 	parse(&c, argc, argv, &o);
 	cli_signals();
-	if (exr_file_read(o.input, &im, &info, &e) || find_layer(&o, &im, channel, &e) ||
+	if (file_exr_read(o.input, &im, &info, &e) || find_layer(&o, &im, channel, &e) ||
 	    render(&c, &o, &im, channel, &canvas, &e) ||
-	    !(history = history_append(exr_file_info_get(&info, EXR_FILE_HISTORY), argc, argv,
-	                               &e)) ||
+	    !(history = file_history_append(file_exr_info_get(&info, EXR_FILE_HISTORY), argc, argv,
+	                                    &e)) ||
 	    write_png(&o, &canvas, history, &e))
 		status = cli_fail(&c, &e);
 	free(history);
-	canvas_free(&canvas);
-	exr_file_info_free(&info);
-	image_free(&im);
+	picture_canvas_free(&canvas);
+	file_exr_info_free(&info);
+	picture_image_free(&im);
 	return cli_finish(&c, status);
 }

@@ -119,7 +119,7 @@ static void diffuse_method(struct trace *t, const char *text)
 
 static void compression(struct trace *t, const char *text)
 {
-	int method = exr_file_compression_by_name(text);
+	int method = file_exr_compression_by_name(text);
 
 	if (method < 0)
 		cli_usage(&t->cli, "--compression: '%s' is none of auto, zip, zips, piz, rle, none", text);
@@ -157,7 +157,7 @@ static void take_option(struct trace *t, int letter)
 	case 'c': take_camera(t, optarg); break;
 	case 'o': t->output = optarg; break;
 	case 's':
-		if (camera_parse_size(optarg, &t->width, &t->height))
+		if (picture_camera_parse_size(optarg, &t->width, &t->height))
 			cli_usage(c, "--size: '%s' is not a size such as 640x480", optarg);
 		break;
 	case 'd': diffuse_method(t, optarg); break;
@@ -227,10 +227,10 @@ static int ad_hoc_camera(struct trace *t, struct err *e)
 	struct err steep = { 0 };
 
 	if (t->has_up) {
-		if (camera_look_at(t->eye, t->target, t->up, fov, &t->ad_hoc, e))
+		if (picture_camera_look_at(t->eye, t->target, t->up, fov, &t->ad_hoc, e))
 			return -1;
-	} else if (camera_look_at(t->eye, t->target, y, fov, &t->ad_hoc, &steep) &&
-	           camera_look_at(t->eye, t->target, minus_z, fov, &t->ad_hoc, e)) {
+	} else if (picture_camera_look_at(t->eye, t->target, y, fov, &t->ad_hoc, &steep) &&
+	           picture_camera_look_at(t->eye, t->target, minus_z, fov, &t->ad_hoc, e)) {
 		return -1; /* -Z would do for looking straight up or down */
 	}
 	t->ad_hoc.name = mem_new(1, sizeof "view", "name", e);
@@ -245,16 +245,16 @@ static void picture_key(const struct trace *t, struct shot *s)
 		v->depth, v->cutoff, v->layers, t->method, v->gather_rays, v->relative, t->budget,
 		t->exr.compression, t->exr.half };
 	char camera[33];
-	struct digest *d = digest_new();
+	struct digest *d = file_digest_new();
 
-	cache_camera_id(s->camera, camera);
-	digest_string(d, "twopass.exr " TWOPASS_VERSION " " REVISION_VIEW);
-	digest_string(d, t->content);
-	digest_string(d, camera);
-	digest_bytes(d, number, sizeof number);
+	file_cache_camera_id(s->camera, camera);
+	file_digest_string(d, "twopass.exr " TWOPASS_VERSION " " REVISION_VIEW);
+	file_digest_string(d, t->content);
+	file_digest_string(d, camera);
+	file_digest_bytes(d, number, sizeof number);
 	if (t->mix)
-		digest_string(d, t->mix);
-	digest_end(d, s->key);
+		file_digest_string(d, t->mix);
+	file_digest_end(d, s->key);
 }
 
 static int add_shot(struct trace *t, const struct camera *c, struct err *e)
@@ -263,7 +263,7 @@ static int add_shot(struct trace *t, const struct camera *c, struct err *e)
 
 	s->camera = c;
 	s->path = pattern_fill(t->output, c->name, e);
-	if (!s->path || camera_frame(c, t->width, t->height, &s->frame, e))
+	if (!s->path || picture_camera_frame(c, t->width, t->height, &s->frame, e))
 		return -1;
 	for (const struct shot *p = t->shot; p < s; p++)
 		if (strcmp(p->path, s->path) == 0)
@@ -290,7 +290,7 @@ static int list_shots(struct trace *t, struct err *e)
 			return -1;
 	for (int i = 0; i < t->cameras && !t->all; i++) {
 		struct err why = { 0 };
-		int k = camera_find(m, t->camera[i], &why);
+		int k = picture_camera_find(m, t->camera[i], &why);
 		if (k < 0)
 			return err_set(e, "%s: %s", t->rad, why.text);
 		if (add_shot(t, &m->camera[k], e))
@@ -298,7 +298,7 @@ static int list_shots(struct trace *t, struct err *e)
 	}
 	if (t->shots == 0) {
 		struct err why = { 0 };
-		camera_find(m, NULL, &why);
+		picture_camera_find(m, NULL, &why);
 		return err_set(e, "%s: %s", t->rad, why.text);
 	}
 	return 0;
@@ -307,12 +307,12 @@ static int list_shots(struct trace *t, struct err *e)
 /* Reads what the header and the cameras say, and decides what has to be done. */
 static int plan(struct trace *t, struct err *e)
 {
-	struct container *c = container_open(t->rad, "twopass.rad", e);
-	int bad = c ? camera_file_get(c, &t->cameras_of, e) : -1;
+	struct container *c = file_container_open(t->rad, "twopass.rad", e);
+	int bad = c ? file_camera_get(c, &t->cameras_of, e) : -1;
 
 	if (!bad)
-		container_digest(c, t->content);
-	container_close(c);
+		file_container_digest(c, t->content);
+	file_container_close(c);
 	return bad ? -1 : list_shots(t, e);
 }
 
@@ -323,11 +323,11 @@ static int read_scene(struct trace *t, int argc, char **argv, struct err *e)
 	double begun = cli_seconds();
 	struct err why = { 0 };
 
-	if (rad_file_read(t->rad, &t->m, &t->s, &t->info, e))
+	if (file_rad_read(t->rad, &t->m, &t->s, &t->info, e))
 		return -1;
-	if (t->mix && light_groups_mix(&t->s, &t->m, t->mix, &why))
+	if (t->mix && radiosity_groups_mix(&t->s, &t->m, t->mix, &why))
 		return err_set(e, "%s: --mix: %s", t->rad, why.text);
-	t->history = history_append(t->info.history, argc, argv, e);
+	t->history = file_history_append(t->info.history, argc, argv, e);
 	double read = cli_seconds();
 	t->rays = ray_scene_new(&t->m, e);
 	if (!t->history || !t->rays)
@@ -337,7 +337,7 @@ static int read_scene(struct trace *t, int argc, char **argv, struct err *e)
 	double ready = cli_seconds();
 	snprintf(t->ready, sizeof t->ready, "%s: %zu triangles, %zu elements, %d band%s; read "
 	         "in %.3f s, ray structure in %.3f s, interpolation in %.3f s", t->rad,
-	         t->m.triangles, t->m.elements, t->m.bands, t->m.bands == 1 ? "" : "s",
+	         t->m.triangle.n, t->m.element.n, t->m.bands, t->m.bands == 1 ? "" : "s",
 	         read - begun, built - read, ready - built);
 	if (!t->scene)
 		return -1;
@@ -372,11 +372,11 @@ static int describe(const struct trace *t, const struct shot *s, const struct vi
 	         v->radiance, cut, v->error);
 	info->white_luminance = 1;
 	info->has_world_to_camera = 1;
-	camera_world_to_camera(&s->frame, info->world_to_camera);
-	return exr_file_info_set(info, EXR_FILE_CAMERA, s->camera->name, e) ||
-	       exr_file_info_set(info, EXR_FILE_HISTORY, t->history, e) ||
-	       exr_file_info_set(info, EXR_FILE_KEY, s->key, e) ||
-	       exr_file_info_set(info, "statistics", statistics, e) ? -1 : 0;
+	picture_camera_world_to_camera(&s->frame, info->world_to_camera);
+	return file_exr_info_set(info, EXR_FILE_CAMERA, s->camera->name, e) ||
+	       file_exr_info_set(info, EXR_FILE_HISTORY, t->history, e) ||
+	       file_exr_info_set(info, EXR_FILE_KEY, s->key, e) ||
+	       file_exr_info_set(info, "statistics", statistics, e) ? -1 : 0;
 }
 
 /* Is some colour too bright for 32-bit floats? */
@@ -386,7 +386,7 @@ static int beyond_float(const struct image *im)
 	size_t pixels = (size_t)im->width * (size_t)im->height;
 
 	for (int c = 0; c < 3; c++) {
-		const float *plane = image_plane(im, image_channel(im, colour[c]));
+		const float *plane = picture_image_plane(im, picture_image_channel(im, colour[c]));
 		for (size_t i = 0; i < pixels; i++)
 			if (!isfinite(plane[i]))
 				return 1;
@@ -404,9 +404,9 @@ static int write_picture(const struct trace *t, const struct shot *s,
 		return err_set(e, "%s: radiance is beyond the range of 32-bit floats; scale down what "
 		               "emits, or --mix", s->path);
 	int bad = describe(t, s, v, &info, e) ||
-	          exr_file_write(s->path, im, &info, &t->exr, &clipped, e);
+	          file_exr_write(s->path, im, &info, &t->exr, &clipped, e);
 
-	exr_file_info_free(&info);
+	file_exr_info_free(&info);
 	if (!bad && clipped)
 		cli_warn(&t->cli, "%s: %zu values beyond the range of --half were clipped", s->path,
 		         clipped);
@@ -424,7 +424,7 @@ static int render_within(const struct trace *t, const struct shot *s, const stru
 	int level = 0, bad;
 
 	for (;;) {
-		image_free(im);
+		picture_image_free(im);
 		*im = (struct image){ 0 };
 		o.samples = 1 << level;
 		o.gather_rays = GATHER_RAYS / 8 << level;
@@ -454,7 +454,7 @@ static int render(const struct trace *t, const struct shot *s, struct err *e)
 	double seconds = cli_seconds() - begun;
 	bad = bad || write_picture(t, s, &v, &im, e);
 	double writing = cli_seconds() - begun - seconds;
-	image_free(&im);
+	picture_image_free(&im);
 	if (bad)
 		return -1;
 	cut_text(&v, cut, sizeof cut);
@@ -474,11 +474,11 @@ static int run(struct trace *t, int argc, char **argv, struct err *e)
 	if (plan(t, e))
 		return -1;
 	for (struct shot *s = t->shot; s < t->shot + t->shots; s++) {
-		s->done = exr_file_up_to_date(s->path, s->key);
+		s->done = file_exr_up_to_date(s->path, s->key);
 		left += !s->done;
 		if (s->done)
 			cli_note(&t->cli, "%s: up to date", s->path);
-		else if (atomic_file_check(s->path, e))
+		else if (file_atomic_check(s->path, e))
 			return -1;
 	}
 	if (left == 0)
@@ -507,7 +507,7 @@ static void release(struct trace *t)
 	solution_free(&t->s);
 	model_free(&t->m);
 	model_free(&t->cameras_of);
-	cache_info_free(&t->info);
+	file_cache_info_free(&t->info);
 }
 
 int main(int argc, char **argv)

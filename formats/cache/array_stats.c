@@ -21,7 +21,7 @@ static double number(const struct container_view *v, uint64_t i)
 	return ((const uint8_t *)v->data)[i];
 }
 
-void array_stats(const struct container_view *v, struct array_stats *out)
+void file_array_stats(const struct container_view *v, struct array_stats *out)
 {
 	double sum = 0;
 

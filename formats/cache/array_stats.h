@@ -10,6 +10,6 @@ struct array_stats {
 };
 
 /* O(elements). */
-void array_stats(const struct container_view *v, struct array_stats *out);
+void file_array_stats(const struct container_view *v, struct array_stats *out);
 
 #endif

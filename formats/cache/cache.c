@@ -11,7 +11,7 @@
 
 enum { ID_DIGITS = 32 };
 
-void cache_info_free(struct cache_info *i)
+void file_cache_info_free(struct cache_info *i)
 {
 	free(i->history);
 	free(i->options);
@@ -24,13 +24,13 @@ void cache_info_free(struct cache_info *i)
 
 static void number(struct digest *d, uint64_t n)
 {
-	digest_bytes(d, &n, sizeof n);
+	file_digest_bytes(d, &n, sizeof n);
 }
 
 /* 1 if a coefficient of a side is non-zero in some band. */
 static int present(const struct materials *mt, const double *coefficient, size_t m, int side)
 {
-	const double *c = &coefficient[material_at(mt, m, side)];
+	const double *c = &coefficient[model_material_at(mt, m, side)];
 
 	for (int b = 0; b < mt->bands; b++)
 		if (c[b] != 0)
@@ -42,7 +42,7 @@ static int present(const struct materials *mt, const double *coefficient, size_t
  * events (lib/chain.h). */
 static int perfect(const struct materials *mt, const double *coefficient, size_t m, int side)
 {
-	const double *c = &coefficient[material_at(mt, m, side)];
+	const double *c = &coefficient[model_material_at(mt, m, side)];
 
 	for (int b = 0; b < mt->bands; b++)
 		if (c[b] != 1)
@@ -55,16 +55,16 @@ static void exponent(struct digest *d, int here, double k)
 {
 	uint8_t flag = (uint8_t)here;
 
-	digest_bytes(d, &flag, 1);
+	file_digest_bytes(d, &flag, 1);
 	if (here)
-		digest_bytes(d, &k, sizeof k);
+		file_digest_bytes(d, &k, sizeof k);
 }
 
 /* What of the materials steers light, colours aside. */
 static void digest_materials(struct digest *d, const struct materials *mt)
 {
 	number(d, mt->n);
-	digest_bytes(d, mt->one_sided, mt->n);
+	file_digest_bytes(d, mt->one_sided, mt->n);
 	for (size_t m = 0; m < mt->n; m++)
 		for (int side = FRONT; side <= BACK; side++) {
 			size_t at = 2 * m + (size_t)side;
@@ -72,8 +72,8 @@ static void digest_materials(struct digest *d, const struct materials *mt)
 			                       (uint8_t)present(mt, mt->tau_d, m, side) };
 			uint8_t colourless[2] = { (uint8_t)perfect(mt, mt->rho_s, m, side),
 			                          (uint8_t)perfect(mt, mt->tau_s, m, side) };
-			digest_bytes(d, diffuse, sizeof diffuse);
-			digest_bytes(d, colourless, sizeof colourless);
+			file_digest_bytes(d, diffuse, sizeof diffuse);
+			file_digest_bytes(d, colourless, sizeof colourless);
 			exponent(d, present(mt, mt->rho_s, m, side), mt->alpha[at]);
 			exponent(d, present(mt, mt->tau_s, m, side), mt->beta[at]);
 			exponent(d, present(mt, mt->emission, m, side),
@@ -84,77 +84,77 @@ static void digest_materials(struct digest *d, const struct materials *mt)
 static void digest_lights(struct digest *d, const struct lights *l)
 {
 	number(d, l->n);
-	digest_bytes(d, l->kind, l->n);
-	digest_bytes(d, l->position, l->n * 3 * sizeof *l->position);
-	digest_bytes(d, l->direction, l->n * 3 * sizeof *l->direction);
-	digest_bytes(d, l->cone, l->n * 2 * sizeof *l->cone);
+	file_digest_bytes(d, l->kind, l->n);
+	file_digest_bytes(d, l->position, l->n * 3 * sizeof *l->position);
+	file_digest_bytes(d, l->direction, l->n * 3 * sizeof *l->direction);
+	file_digest_bytes(d, l->cone, l->n * 2 * sizeof *l->cone);
 }
 
 static void geometry_id(const struct model *m, char hex[33])
 {
-	struct digest *d = digest_new();
+	struct digest *d = file_digest_new();
 
 	number(d, (uint64_t)m->lobe);
 	digest_materials(d, &m->material);
 	digest_lights(d, &m->light);
-	const size_t counts[] = { m->surface.n, m->vertices, m->triangles, m->splits,
-	                          m->elements, m->patches, m->loops, m->loop_indices };
-	digest_bytes(d, counts, sizeof counts);
-	digest_bytes(d, m->surface.material, m->surface.n * sizeof *m->surface.material);
-	digest_bytes(d, m->vertex, m->vertices * 3 * sizeof *m->vertex);
-	digest_bytes(d, m->triangle, m->triangles * 3 * sizeof *m->triangle);
-	digest_bytes(d, m->triangle_surface, m->triangles * sizeof *m->triangle_surface);
-	digest_bytes(d, m->triangle_split, m->triangles * sizeof *m->triangle_split);
-	digest_bytes(d, m->split, m->splits * sizeof *m->split);
-	digest_bytes(d, m->element, m->elements * 3 * sizeof *m->element);
-	digest_bytes(d, m->element_triangle, m->elements * sizeof *m->element_triangle);
-	digest_bytes(d, m->patch_start, (m->patches + 1) * sizeof *m->patch_start);
-	digest_bytes(d, m->patch_surface, m->patches * sizeof *m->patch_surface);
-	digest_bytes(d, m->patch_loop, (m->patches + 1) * sizeof *m->patch_loop);
-	digest_bytes(d, m->loop_start, (m->loops + 1) * sizeof *m->loop_start);
-	digest_bytes(d, m->loop_index, m->loop_indices * sizeof *m->loop_index);
-	digest_end(d, hex);
+	const size_t counts[] = { m->surface.n, m->vertices, m->triangle.n, m->splits,
+	                          m->element.n, m->patch.n, m->patch.loops, m->patch.loop_indices };
+	file_digest_bytes(d, counts, sizeof counts);
+	file_digest_bytes(d, m->surface.material, m->surface.n * sizeof *m->surface.material);
+	file_digest_bytes(d, m->vertex, m->vertices * 3 * sizeof *m->vertex);
+	file_digest_bytes(d, m->triangle.corner, m->triangle.n * 3 * sizeof *m->triangle.corner);
+	file_digest_bytes(d, m->triangle.surface, m->triangle.n * sizeof *m->triangle.surface);
+	file_digest_bytes(d, m->triangle.split, m->triangle.n * sizeof *m->triangle.split);
+	file_digest_bytes(d, m->split, m->splits * sizeof *m->split);
+	file_digest_bytes(d, m->element.corner, m->element.n * 3 * sizeof *m->element.corner);
+	file_digest_bytes(d, m->element.triangle, m->element.n * sizeof *m->element.triangle);
+	file_digest_bytes(d, m->patch.start, (m->patch.n + 1) * sizeof *m->patch.start);
+	file_digest_bytes(d, m->patch.surface, m->patch.n * sizeof *m->patch.surface);
+	file_digest_bytes(d, m->patch.loop, (m->patch.n + 1) * sizeof *m->patch.loop);
+	file_digest_bytes(d, m->patch.loop_start, (m->patch.loops + 1) * sizeof *m->patch.loop_start);
+	file_digest_bytes(d, m->patch.loop_index, m->patch.loop_indices * sizeof *m->patch.loop_index);
+	file_digest_end(d, hex);
 }
 
 static void material_id(const struct model *m, char hex[33])
 {
 	const struct materials *mt = &m->material;
-	struct digest *d = digest_new();
+	struct digest *d = file_digest_new();
 	const double *banded[] = { mt->rho_d, mt->tau_d, mt->rho_s, mt->tau_s, mt->emission };
 
 	number(d, mt->n);
 	number(d, (uint64_t)mt->bands);
 	for (size_t i = 0; i < sizeof banded / sizeof *banded; i++)
-		digest_bytes(d, banded[i], 2 * mt->n * (size_t)mt->bands * sizeof *banded[i]);
-	digest_bytes(d, m->light.intensity,
-	             m->light.n * (size_t)m->bands * sizeof *m->light.intensity);
-	digest_end(d, hex);
+		file_digest_bytes(d, banded[i], 2 * mt->n * (size_t)mt->bands * sizeof *banded[i]);
+	file_digest_bytes(d, m->light.intensity,
+	                  m->light.n * (size_t)m->bands * sizeof *m->light.intensity);
+	file_digest_end(d, hex);
 }
 
-void cache_camera_id(const struct camera *c, char hex[33])
+void file_cache_camera_id(const struct camera *c, char hex[33])
 {
-	struct digest *d = digest_new();
+	struct digest *d = file_digest_new();
 	const double lens[] = { c->yfov, c->aspect, c->xmag, c->ymag };
 
-	digest_string(d, c->name);
+	file_digest_string(d, c->name);
 	number(d, (uint64_t)c->orthographic);
-	digest_bytes(d, c->to_world, sizeof c->to_world);
-	digest_bytes(d, lens, sizeof lens);
-	digest_end(d, hex);
+	file_digest_bytes(d, c->to_world, sizeof c->to_world);
+	file_digest_bytes(d, lens, sizeof lens);
+	file_digest_end(d, hex);
 }
 
-void cache_ids(const struct model *m, struct cache_info *i)
+void file_cache_ids(const struct model *m, struct cache_info *i)
 {
-	struct digest *d = digest_new();
+	struct digest *d = file_digest_new();
 
 	geometry_id(m, i->geometry_id);
 	material_id(m, i->material_id);
 	for (size_t c = 0; c < m->cameras; c++) {
 		char hex[33];
-		cache_camera_id(&m->camera[c], hex);
-		digest_string(d, hex);
+		file_cache_camera_id(&m->camera[c], hex);
+		file_digest_string(d, hex);
 	}
-	digest_end(d, i->camera_id);
+	file_digest_end(d, i->camera_id);
 }
 
 /* ---- metadata ---- */
@@ -165,8 +165,8 @@ static const char *version_of(const char *format)
 	return strcmp(format, "twopass.ff") == 0 ? CACHE_FF_VERSION : CACHE_VERSION;
 }
 
-int cache_write_info(struct container_writer *w, const char *format,
-                     const struct cache_info *i, struct err *e)
+int file_cache_write_info(struct container_writer *w, const char *format,
+                          const struct cache_info *i, struct err *e)
 {
 	const struct {
 		const char *key, *value;
@@ -178,49 +178,49 @@ int cache_write_info(struct container_writer *w, const char *format,
 	};
 
 	for (size_t k = 0; k < sizeof meta / sizeof *meta; k++)
-		if (meta[k].value && *meta[k].value && container_meta(w, meta[k].key, meta[k].value, e))
+		if (meta[k].value && *meta[k].value && file_container_meta(w, meta[k].key, meta[k].value, e))
 			return -1;
 	return 0;
 }
 
 static int read_text(const struct container *c, const char *key, char **out, struct err *e)
 {
-	const char *text = container_get_meta(c, key);
+	const char *text = file_container_get_meta(c, key);
 
 	if (text && !(*out = strdup(text)))
-		return err_set(e, "%s: out of memory", container_path(c));
+		return err_set(e, "%s: out of memory", file_container_path(c));
 	return 0;
 }
 
 /* Which ids a file has depends on its kind; readers compare those they need. */
 static int read_id(const struct container *c, const char *key, char hex[33], struct err *e)
 {
-	const char *text = container_get_meta(c, key);
+	const char *text = file_container_get_meta(c, key);
 
 	if (!text)
 		return 0;
 	if (strlen(text) != ID_DIGITS)
-		return container_refuse(c, e, "metadata %s: not %d hexadecimal digits", key,
-		                        ID_DIGITS);
+		return file_container_refuse(c, e, "metadata %s: not %d hexadecimal digits", key,
+		                             ID_DIGITS);
 	memcpy(hex, text, ID_DIGITS + 1);
 	return 0;
 }
 
-int cache_read_info(const struct container *c, struct cache_info *i, struct err *e)
+int file_cache_read_info(const struct container *c, struct cache_info *i, struct err *e)
 {
-	const char *version = container_get_meta(c, "version");
-	const char *known = version_of(container_get_meta(c, "format"));
+	const char *version = file_container_get_meta(c, "version");
+	const char *known = version_of(file_container_get_meta(c, "format"));
 
 	*i = (struct cache_info){ 0 };
 	if (!version || strcmp(version, known) != 0)
-		return container_refuse(c, e, "version %.20s, this program knows version %s",
-		                        version ? version : "missing", known);
+		return file_container_refuse(c, e, "version %.20s, this program knows version %s",
+		                             version ? version : "missing", known);
 	if (read_text(c, "history", &i->history, e) || read_text(c, "options", &i->options, e) ||
 	    read_text(c, "report", &i->report, e) || read_text(c, "key", &i->key, e) ||
 	    read_id(c, "geometry_id", i->geometry_id, e) ||
 	    read_id(c, "material_id", i->material_id, e) ||
 	    read_id(c, "camera_id", i->camera_id, e)) {
-		cache_info_free(i);
+		file_cache_info_free(i);
 		return -1;
 	}
 	return 0;
@@ -228,8 +228,8 @@ int cache_read_info(const struct container *c, struct cache_info *i, struct err 
 
 /* ---- names ---- */
 
-int cache_write_names(struct container_writer *w, const char *key, char *const *name,
-                      size_t n, struct err *e)
+int file_cache_write_names(struct container_writer *w, const char *key, char *const *name,
+                           size_t n, struct err *e)
 {
 	json_t *list = json_array();
 	int failed = 0;
@@ -237,17 +237,17 @@ int cache_write_names(struct container_writer *w, const char *key, char *const *
 	for (size_t i = 0; i < n && !failed; i++)
 		if (json_array_append_new(list, json_string(name[i])))
 			failed = err_set(e, "%s: cannot write: name %zu of %s is not UTF-8 text",
-			                 container_writer_path(w), i, key);
+			                 file_container_writer_path(w), i, key);
 	char *text = failed ? NULL : json_dumps(list, JSON_COMPACT);
 	json_decref(list);
 	if (!failed && !text)
-		failed = err_set(e, "%s: out of memory", container_writer_path(w));
-	failed = failed || container_meta(w, key, text, e);
+		failed = err_set(e, "%s: out of memory", file_container_writer_path(w));
+	failed = failed || file_container_meta(w, key, text, e);
 	free(text);
 	return failed ? -1 : 0;
 }
 
-void cache_names_free(char **name, size_t n)
+void file_cache_names_free(char **name, size_t n)
 {
 	for (size_t i = 0; name && i < n; i++)
 		free(name[i]);
@@ -260,18 +260,18 @@ static int copy_names(const struct container *c, const char *key, const json_t *
 	for (size_t i = 0; i < n; i++) {
 		const char *text = json_string_value(json_array_get(list, i));
 		if (!text)
-			return container_refuse(c, e, "metadata %s: name %zu is not a string", key,
-			                        i);
+			return file_container_refuse(c, e, "metadata %s: name %zu is not a string", key,
+			                             i);
 		if (!(name[i] = strdup(text)))
-			return err_set(e, "%s: out of memory", container_path(c));
+			return err_set(e, "%s: out of memory", file_container_path(c));
 	}
 	return 0;
 }
 
-int cache_read_names(const struct container *c, const char *key, char ***name, size_t n,
-                     struct err *e)
+int file_cache_read_names(const struct container *c, const char *key, char ***name, size_t n,
+                          struct err *e)
 {
-	const char *text = container_get_meta(c, key);
+	const char *text = file_container_get_meta(c, key);
 	json_error_t je;
 	json_t *list = text ? json_loads(text, 0, &je) : NULL;
 
@@ -279,31 +279,31 @@ int cache_read_names(const struct container *c, const char *key, char ***name, s
 	/* Before there is room for them: n comes from the file, too. */
 	int failed = !json_is_array(list) || json_array_size(list) != n;
 	if (failed)
-		container_refuse(c, e, "metadata %s: not a list of %zu names", key, n);
+		file_container_refuse(c, e, "metadata %s: not a list of %zu names", key, n);
 	else
 		failed = !(*name = mem_new(n, sizeof **name, key, e)) ||
 		         copy_names(c, key, list, *name, n, e);
 	json_decref(list);
 	if (!failed)
 		return 0;
-	cache_names_free(*name, n);
+	file_cache_names_free(*name, n);
 	*name = NULL;
 	return -1;
 }
 
-int cache_up_to_date(const char *path, const char *format, const char *key)
+int file_cache_up_to_date(const char *path, const char *format, const char *key)
 {
 	struct err ignored = { 0 };
-	struct container *c = container_open(path, format, &ignored);
+	struct container *c = file_container_open(path, format, &ignored);
 	const char *version, *have;
 
 	if (!c)
 		return 0;
-	version = container_get_meta(c, "version");
-	have = container_get_meta(c, "key");
+	version = file_container_get_meta(c, "version");
+	have = file_container_get_meta(c, "key");
 	int same = version && strcmp(version, version_of(format)) == 0 && have && *have &&
 	           strcmp(have, key) == 0;
-	container_close(c);
+	file_container_close(c);
 	/* make(1) must see it newer than what it was made from. */
 	return same && utimensat(AT_FDCWD, path, NULL, 0) == 0;
 }

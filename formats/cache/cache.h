@@ -27,7 +27,7 @@ struct cache_info {
 	char camera_id[33];    /* all cameras */
 };
 
-void cache_info_free(struct cache_info *i);
+void file_cache_info_free(struct cache_info *i);
 
 /* Fills the three ids from the model. geometry_id covers vertices, triangles,
  * elements, split trees, patches, sides modelled, lobe kind, exponents, emission
@@ -35,27 +35,27 @@ void cache_info_free(struct cache_info *i);
  * directional coefficients are 1 (in all bands), the
  * assignment of materials to surfaces, kinds, places, directions and cones of lights; not
  * names, coefficients, intensities, bands, UVs, NORMALs. */
-void cache_ids(const struct model *m, struct cache_info *i);
+void file_cache_ids(const struct model *m, struct cache_info *i);
 
 /* Digest of one camera (32 hex digits). */
-void cache_camera_id(const struct camera *c, char hex[33]);
+void file_cache_camera_id(const struct camera *c, char hex[33]);
 
 /* Writes / reads the info as __metadata__ strings, leaving out what is NULL or "".
- * cache_read_info checks the format's version. */
-int cache_write_info(struct container_writer *w, const char *format,
-                     const struct cache_info *i, struct err *e);
-int cache_read_info(const struct container *c, struct cache_info *i, struct err *e);
+ * file_cache_read_info checks the format's version. */
+int file_cache_write_info(struct container_writer *w, const char *format,
+                          const struct cache_info *i, struct err *e);
+int file_cache_read_info(const struct container *c, struct cache_info *i, struct err *e);
 
 /* Lists of names as metadata: a JSON array of strings. The reader wants exactly n
- * of them; *name is allocated, name by name (cache_names_free). */
-int cache_write_names(struct container_writer *w, const char *key, char *const *name,
-                      size_t n, struct err *e);
-int cache_read_names(const struct container *c, const char *key, char ***name, size_t n,
-                     struct err *e);
-void cache_names_free(char **name, size_t n);
+ * of them; *name is allocated, name by name (file_cache_names_free). */
+int file_cache_write_names(struct container_writer *w, const char *key, char *const *name,
+                           size_t n, struct err *e);
+int file_cache_read_names(const struct container *c, const char *key, char ***name, size_t n,
+                          struct err *e);
+void file_cache_names_free(char **name, size_t n);
 
 /* 1 if `path` exists, is a whole container of this format (structure and header
  * digest checked) and its key is `key`: then the file is touched (mtime now). */
-int cache_up_to_date(const char *path, const char *format, const char *key);
+int file_cache_up_to_date(const char *path, const char *format, const char *key);
 
 #endif

@@ -12,9 +12,9 @@ static const void *rows(const struct container *c, const char *name, enum dtype 
                         uint64_t n, uint64_t width, struct err *e)
 {
 	uint64_t shape[2] = { n, width };
-	const struct container_view *v = container_need(c, name, t, width > 1 ? 2 : 1, shape, e);
+	const struct container_view *v = file_container_need(c, name, t, width > 1 ? 2 : 1, shape, e);
 
-	return v && container_verify(c, v, e) == 0 ? v->data : NULL;
+	return v && file_container_verify(c, v, e) == 0 ? v->data : NULL;
 }
 
 static int check(const struct container *c, const struct camera *camera, struct err *e)
@@ -23,14 +23,14 @@ static int check(const struct container *c, const struct camera *camera, struct 
 
 	for (int k = 0; k < 16; k++)
 		sum += camera->to_world[k];
-	if (!isfinite(sum) || (!camera->orthographic && !camera_yfov_valid(camera->yfov)))
-		return container_refuse(c, e, "camera '%s': values out of range", camera->name);
+	if (!isfinite(sum) || (!camera->orthographic && !model_camera_yfov_valid(camera->yfov)))
+		return file_container_refuse(c, e, "camera '%s': values out of range", camera->name);
 	return 0;
 }
 
-int camera_file_get(const struct container *c, struct model *m, struct err *e)
+int file_camera_get(const struct container *c, struct model *m, struct err *e)
 {
-	const struct container_view *v = container_find(c, "camera_to_world");
+	const struct container_view *v = file_container_find(c, "camera_to_world");
 	uint64_t n = v && v->dims == 2 ? v->shape[0] : UINT64_MAX;
 	const double *to_world = rows(c, "camera_to_world", DT_F64, n, 16, e);
 	const double *yfov = rows(c, "camera_yfov", DT_F64, n, 1, e);
@@ -42,7 +42,7 @@ int camera_file_get(const struct container *c, struct model *m, struct err *e)
 	int bad = 0;
 
 	if (!to_world || !yfov || !aspect || !xmag || !ymag || !orthographic ||
-	    cache_read_names(c, "cameras", &name, (size_t)n, e))
+	    file_cache_read_names(c, "cameras", &name, (size_t)n, e))
 		return -1;
 	m->camera = mem_new((size_t)n, sizeof *m->camera, "cameras", e);
 	bad = m->camera ? 0 : -1;
@@ -55,6 +55,6 @@ int camera_file_get(const struct container *c, struct model *m, struct err *e)
 		name[i] = NULL; /* now the camera's */
 		bad = check(c, camera, e);
 	}
-	cache_names_free(name, (size_t)n);
+	file_cache_names_free(name, (size_t)n);
 	return bad;
 }

@@ -7,6 +7,6 @@
 
 /* Fills the cameras of a zeroed model. Their arrays are verified. The cost does not
  * depend on the size of the scene. 0, or -1 and e; release with model_free. */
-int camera_file_get(const struct container *c, struct model *m, struct err *e);
+int file_camera_get(const struct container *c, struct model *m, struct err *e);
 
 #endif

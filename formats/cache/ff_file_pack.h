@@ -14,7 +14,7 @@ struct ff_known {
 	uint64_t place;
 };
 
-/* Scratch of one file, begin with {0}; release with ff_packed_free. */
+/* Scratch of one file, begin with {0}; release with file_ff_packed_free. */
 struct ff_packed {
 	struct vec word, block_column;               /* uint32_t, uint64_t */
 	uint64_t words;                              /* of all batches */
@@ -23,18 +23,18 @@ struct ff_packed {
 	struct vec column, value, start, scale;      /* of a batch summed by patch */
 };
 
-void ff_packed_free(struct ff_packed *p);
+void file_ff_packed_free(struct ff_packed *p);
 
 /* The words of the file's next batch of lists, which become spans in each block where
  * that takes fewer, and are left out where one of the last blocks had the same: p->word
  * [p->words so far], and p->block_column [blocks] as struct ff has it. O(entries). 0, or
  * -1 and e. */
-int ff_pack_columns(const struct ff *batch, struct ff_packed *p, struct err *e);
+int file_ff_pack_columns(const struct ff *batch, struct ff_packed *p, struct err *e);
 
 /* Turns a batch of lists of element-sides into one of patch-sides: values are summed,
  * and row scales made to fit them after rounding. *out borrows the batch's other
  * arrays and p's. O(entries). 0, or -1 and e. */
-int ff_sum_by_patch(const struct ff *batch, const struct model *m, struct ff_packed *p,
-                    struct ff *out, struct err *e);
+int file_ff_sum_by_patch(const struct ff *batch, const struct model *m, struct ff_packed *p,
+                         struct ff *out, struct err *e);
 
 #endif

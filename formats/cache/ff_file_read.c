@@ -12,14 +12,14 @@
 
 static enum dtype value_type(const struct container *c)
 {
-	const struct container_view *v = container_find(c, "value");
+	const struct container_view *v = file_container_find(c, "value");
 
 	return v && v->type == DT_F64 ? DT_F64 : DT_F32;
 }
 
 static enum dtype column_type(const struct container *c)
 {
-	const struct container_view *v = container_find(c, "column");
+	const struct container_view *v = file_container_find(c, "column");
 
 	return v && v->type == DT_U16 ? DT_U16 : DT_U32;
 }
@@ -28,24 +28,24 @@ static enum dtype column_type(const struct container *c)
 static int size_if_any(const struct container *c, const char *name, size_t *size, struct err *e)
 {
 	*size = 0;
-	return container_find(c, name) ? fields_size(c, name, DT_U32, 1, 0, size, e) : 0;
+	return file_container_find(c, name) ? file_fields_size(c, name, DT_U32, 1, 0, size, e) : 0;
 }
 
 /* Sizes from the arrays that have them to themselves. */
 static int get_counts(const struct container *c, struct ff *f, struct err *e)
 {
-	if (fields_size(c, "chain_start", DT_U64, 1, 0, &f->chains, e) ||
-	    size_if_any(c, "chain_event", &f->chain_events, e) ||
-	    fields_size(c, "row_scale", DT_F64, 1, 0, &f->rows, e) ||
-	    fields_size(c, "block_column", DT_U64, 1, 0, &f->blocks, e) ||
-	    fields_size(c, "column", column_type(c), 1, 0, &f->columns, e) ||
-	    fields_size(c, "value", value_type(c), 1, 0, &f->entries, e) ||
-	    size_if_any(c, "arrival_target", &f->arrivals, e) ||
-	    size_if_any(c, "link_target", &f->links, e))
+	if (file_fields_size(c, "chain_start", DT_U64, 1, 0, &f->chain.n, e) ||
+	    size_if_any(c, "chain_event", &f->chain.events, e) ||
+	    file_fields_size(c, "row_scale", DT_F64, 1, 0, &f->row.n, e) ||
+	    file_fields_size(c, "block_column", DT_U64, 1, 0, &f->block.n, e) ||
+	    file_fields_size(c, "column", column_type(c), 1, 0, &f->columns, e) ||
+	    file_fields_size(c, "value", value_type(c), 1, 0, &f->entries, e) ||
+	    size_if_any(c, "arrival_target", &f->arrival.n, e) ||
+	    size_if_any(c, "link_target", &f->link.n, e))
 		return -1;
-	if (f->chains == 0)
-		return container_refuse(c, e, "array chain_start: it is empty");
-	f->chains--; /* starts are one more than what they start */
+	if (f->chain.n == 0)
+		return file_container_refuse(c, e, "array chain_start: it is empty");
+	f->chain.n--; /* starts are one more than what they start */
 	return 0;
 }
 
@@ -54,32 +54,32 @@ static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
 {
 	const int f64 = value_type(c) == DT_F64, narrow = column_type(c) == DT_U16;
 	const struct field_or_not field[] = {
-		{ { &f->chain_start, "chain_start", DT_U64, 1, { f->chains + 1 } }, FIELD_NEVER },
-		{ { &f->chain_event, "chain_event", DT_U32, 1, { f->chain_events } }, FIELD_EMPTY },
-		{ { &f->chain_count, "chain_count", DT_U32, 1, { f->chain_events } }, FIELD_EMPTY },
-		{ { &f->row_side, "row_side", DT_U32, 1, { f->rows } }, FIELD_EVEN },
-		{ { &f->row_kind, "row_kind", DT_U8, 1, { f->rows } }, FIELD_ZEROS },
-		{ { &f->row_samples, "row_samples", DT_U32, 1, { f->rows } }, FIELD_ZEROS },
-		{ { &f->row_scale, "row_scale", DT_F64, 1, { f->rows } }, FIELD_NEVER },
-		{ { &f->row_residual, "row_residual", DT_F32, 1, { f->rows } }, FIELD_NEVER },
-		{ { &f->row_error, "row_error", DT_F32, 1, { f->rows } }, FIELD_NEVER },
-		{ { &f->row_block, "row_block", DT_U64, 1, { f->rows + 1 } }, FIELD_ORDER },
-		{ { &f->block_chain, "block_chain", DT_U32, 1, { f->blocks } }, FIELD_ZEROS },
-		{ { &f->block_start, "block_start", DT_U64, 1, { f->blocks + 1 } }, FIELD_NEVER },
-		{ { &f->block_column, "block_column", DT_U64, 1, { f->blocks } }, FIELD_NEVER },
-		{ { &f->block_escape, "block_escape", DT_F64, 1, { f->blocks } }, FIELD_ZEROS },
-		{ { &f->block_black, "block_black", DT_F64, 1, { f->blocks } }, FIELD_ZEROS },
-		{ { &f->block_lost, "block_lost", DT_F64, 1, { f->blocks } }, FIELD_ZEROS },
-		{ { &f->block_cut, "block_cut", DT_F64, 1, { f->blocks } }, FIELD_ZEROS },
-		{ { &f->block_arrival, "block_arrival", DT_U64, 1, { f->blocks + 1 } }, FIELD_ZEROS },
-		{ { &f->arrival_target, "arrival_target", DT_U32, 1, { f->arrivals } }, FIELD_EMPTY },
-		{ { &f->arrival_direction, "arrival_direction", DT_F32, 2, { f->arrivals, 3 } }, FIELD_EMPTY },
-		{ { &f->link_target, "link_target", DT_U32, 1, { f->links } }, FIELD_EMPTY },
-		{ { &f->link_source, "link_source", DT_U32, 1, { f->links } }, FIELD_EMPTY },
-		{ { &f->link_last, "link_last", DT_U32, 1, { f->links } }, FIELD_EMPTY },
-		{ { &f->link_chain, "link_chain", DT_U32, 1, { f->links } }, FIELD_EMPTY },
-		{ { &f->link_direction, "link_direction", DT_F32, 2, { f->links, 3 } }, FIELD_EMPTY },
-		{ { &f->link_row, "link_row", DT_U32, 2, { f->links, 2 } }, FIELD_EMPTY },
+		{ { &f->chain.start, "chain_start", DT_U64, 1, { f->chain.n + 1 } }, FIELD_NEVER },
+		{ { &f->chain.event, "chain_event", DT_U32, 1, { f->chain.events } }, FIELD_EMPTY },
+		{ { &f->chain.count, "chain_count", DT_U32, 1, { f->chain.events } }, FIELD_EMPTY },
+		{ { &f->row.side, "row_side", DT_U32, 1, { f->row.n } }, FIELD_EVEN },
+		{ { &f->row.kind, "row_kind", DT_U8, 1, { f->row.n } }, FIELD_ZEROS },
+		{ { &f->row.samples, "row_samples", DT_U32, 1, { f->row.n } }, FIELD_ZEROS },
+		{ { &f->row.scale, "row_scale", DT_F64, 1, { f->row.n } }, FIELD_NEVER },
+		{ { &f->row.residual, "row_residual", DT_F32, 1, { f->row.n } }, FIELD_NEVER },
+		{ { &f->row.error, "row_error", DT_F32, 1, { f->row.n } }, FIELD_NEVER },
+		{ { &f->row.block, "row_block", DT_U64, 1, { f->row.n + 1 } }, FIELD_ORDER },
+		{ { &f->block.chain, "block_chain", DT_U32, 1, { f->block.n } }, FIELD_ZEROS },
+		{ { &f->block.start, "block_start", DT_U64, 1, { f->block.n + 1 } }, FIELD_NEVER },
+		{ { &f->block.column, "block_column", DT_U64, 1, { f->block.n } }, FIELD_NEVER },
+		{ { &f->block.escape, "block_escape", DT_F64, 1, { f->block.n } }, FIELD_ZEROS },
+		{ { &f->block.black, "block_black", DT_F64, 1, { f->block.n } }, FIELD_ZEROS },
+		{ { &f->block.lost, "block_lost", DT_F64, 1, { f->block.n } }, FIELD_ZEROS },
+		{ { &f->block.cut, "block_cut", DT_F64, 1, { f->block.n } }, FIELD_ZEROS },
+		{ { &f->block.arrival, "block_arrival", DT_U64, 1, { f->block.n + 1 } }, FIELD_ZEROS },
+		{ { &f->arrival.target, "arrival_target", DT_U32, 1, { f->arrival.n } }, FIELD_EMPTY },
+		{ { &f->arrival.direction, "arrival_direction", DT_F32, 2, { f->arrival.n, 3 } }, FIELD_EMPTY },
+		{ { &f->link.target, "link_target", DT_U32, 1, { f->link.n } }, FIELD_EMPTY },
+		{ { &f->link.source, "link_source", DT_U32, 1, { f->link.n } }, FIELD_EMPTY },
+		{ { &f->link.last, "link_last", DT_U32, 1, { f->link.n } }, FIELD_EMPTY },
+		{ { &f->link.chain, "link_chain", DT_U32, 1, { f->link.n } }, FIELD_EMPTY },
+		{ { &f->link.direction, "link_direction", DT_F32, 2, { f->link.n, 3 } }, FIELD_EMPTY },
+		{ { &f->link.row, "link_row", DT_U32, 2, { f->link.n, 2 } }, FIELD_EMPTY },
 		{ { part, "part", DT_U32, 1, { 4 } }, FIELD_NEVER },
 		{ { most, "chain_most", DT_U32, 1, { 1 } }, FIELD_ZEROS },
 		{ { narrow ? (void *)&f->column16 : (void *)&f->column, "column",
@@ -88,18 +88,18 @@ static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
 		  f64 ? DT_F64 : DT_F32, 1, { f->entries } }, FIELD_NEVER },
 	};
 
-	return fields_map_or_make(c, field, sizeof field / sizeof *field, made, e);
+	return file_fields_map_or_make(c, field, sizeof field / sizeof *field, made, e);
 }
 
 static int get_receivers(const struct container *c, struct ff *f, struct err *e)
 {
-	const char *text = container_get_meta(c, "receivers");
+	const char *text = file_container_get_meta(c, "receivers");
 
 	f->to_patches = text && strcmp(text, "patches") == 0;
 	if (text && (f->to_patches || strcmp(text, "elements") == 0))
 		return 0;
-	return container_refuse(c, e, "metadata receivers: %.20s, neither elements nor patches",
-	                        text ? text : "missing");
+	return file_container_refuse(c, e, "metadata receivers: %.20s, neither elements nor patches",
+	                             text ? text : "missing");
 }
 
 static int map_ff(struct ff_file *o, struct err *e)
@@ -112,9 +112,9 @@ static int map_ff(struct ff_file *o, struct err *e)
 		return -1;
 	f->patch_begin = part[0];
 	f->patch_end = part[1];
-	f->part = part[2];
-	f->parts = part[3];
-	f->chain_most = container_find(c, "chain_most") ? *most : 1;
+	f->shard = part[2];
+	f->shards = part[3];
+	f->chain.most = file_container_find(c, "chain_most") ? *most : 1;
 	return 0;
 }
 
@@ -130,12 +130,12 @@ static int map_patches(struct ff_file *o, struct err *e)
 		{ { &sides, "patch_sides", DT_U8, 1, { s->patches } }, FIELD_ZEROS },
 	};
 
-	if (fields_map_or_make(o->container, field, sizeof field / sizeof *field, &o->made, e))
+	if (file_fields_map_or_make(o->container, field, sizeof field / sizeof *field, &o->made, e))
 		return -1;
-	if (!container_find(o->container, "patch_start"))
+	if (!file_container_find(o->container, "patch_start"))
 		for (size_t p = 0; p <= s->patches; p++)
 			start[p] *= (uint32_t)(s->patches ? s->elements / s->patches : 0);
-	if (!container_find(o->container, "patch_sides"))
+	if (!file_container_find(o->container, "patch_sides"))
 		memset(sides, 1, s->patches);
 	s->patch_start = start;
 	s->patch_sides = sides;
@@ -149,11 +149,11 @@ static int map_scene(struct ff_file *o, struct err *e)
 	const uint64_t *counts = NULL;
 	const struct field number = { &counts, "model_counts", DT_U64, 1, { 5 } };
 
-	if (fields_map(c, &number, 1, e))
+	if (file_fields_map(c, &number, 1, e))
 		return -1;
 	if (counts[0] >= INT32_MAX || counts[1] >= INT32_MAX || counts[2] >= INT32_MAX ||
 	    counts[4] >= INT32_MAX)
-		return container_refuse(c, e, "array model_counts: impossible");
+		return file_container_refuse(c, e, "array model_counts: impossible");
 	s->patches = (size_t)counts[0];
 	s->elements = (size_t)counts[1];
 	s->materials = (size_t)counts[2];
@@ -164,35 +164,35 @@ static int map_scene(struct ff_file *o, struct err *e)
 		{ &s->patch_area, "patch_area", DT_F64, 1, { s->patches } },
 		{ &o->patch_surface, "patch_surface", DT_U32, 1, { s->patches } },
 	};
-	if (fields_map(c, field, sizeof field / sizeof *field, e) || map_patches(o, e))
+	if (file_fields_map(c, field, sizeof field / sizeof *field, e) || map_patches(o, e))
 		return -1;
 	if (s->patch_start[s->patches] != s->elements)
-		return container_refuse(c, e, "array patch_start: it ends with %" PRIu32 " of %zu "
-		                        "elements", s->patch_start[s->patches], s->elements);
+		return file_container_refuse(c, e, "array patch_start: it ends with %" PRIu32 " of %zu "
+		                             "elements", s->patch_start[s->patches], s->elements);
 	for (size_t p = 0; p < s->patches; p++)
 		if (o->patch_surface[p] >= o->surfaces)
-			return container_refuse(c, e, "array patch_surface: value %zu is %" PRIu32
-			                        " of %zu surfaces", p, o->patch_surface[p],
-			                        o->surfaces);
-	return cache_read_names(c, "surfaces", &o->surface_name, o->surfaces, e) ||
-	       cache_read_names(c, "lights", &o->light_name, s->lights, e) ? -1 : 0;
+			return file_container_refuse(c, e, "array patch_surface: value %zu is %" PRIu32
+			                             " of %zu surfaces", p, o->patch_surface[p],
+			                             o->surfaces);
+	return file_cache_read_names(c, "surfaces", &o->surface_name, o->surfaces, e) ||
+	       file_cache_read_names(c, "lights", &o->light_name, s->lights, e) ? -1 : 0;
 }
 
 static int check_id(const struct ff_file *o, const struct cache_info *m_info, struct err *e)
 {
 	return m_info && strcmp(m_info->geometry_id, o->info.geometry_id) != 0
-	           ? container_refuse(o->container, e, "made for another geometry") : 0;
+	           ? file_container_refuse(o->container, e, "made for another geometry") : 0;
 }
 
 static int check_patches(const struct ff_file *o, const struct model *m, struct err *e)
 {
-	int other = m && (m->patches != o->scene.patches || m->elements != o->scene.elements ||
+	int other = m && (m->patch.n != o->scene.patches || m->element.n != o->scene.elements ||
 	                  m->material.n != o->scene.materials ||
 	                  m->light.n != o->scene.lights ||
-	                  memcmp(m->patch_start, o->scene.patch_start,
-	                         (m->patches + 1) * sizeof *m->patch_start) != 0);
+	                  memcmp(m->patch.start, o->scene.patch_start,
+	                         (m->patch.n + 1) * sizeof *m->patch.start) != 0);
 
-	return other ? container_refuse(o->container, e, "made for another geometry") : 0;
+	return other ? file_container_refuse(o->container, e, "made for another geometry") : 0;
 }
 
 static int open_ff(const char *path, const struct model *m, const struct cache_info *m_info,
@@ -201,34 +201,34 @@ static int open_ff(const char *path, const struct model *m, const struct cache_i
 	struct err why = { 0 };
 
 	/* Binding first: for a file of another scene the rest does not matter. */
-	if (!(o->container = container_open(path, FORMAT, e)) ||
-	    cache_read_info(o->container, &o->info, e) || check_id(o, m_info, e) ||
-	    container_verify_all(o->container, e) || map_scene(o, e) ||
+	if (!(o->container = file_container_open(path, FORMAT, e)) ||
+	    file_cache_read_info(o->container, &o->info, e) || check_id(o, m_info, e) ||
+	    file_container_verify_all(o->container, e) || map_scene(o, e) ||
 	    check_patches(o, m, e) || map_ff(o, e))
 		return -1;
-	return ff_check(&o->f, &o->scene, &why) ? container_refuse(o->container, e, "%s", why.text)
+	return ff_check(&o->f, &o->scene, &why) ? file_container_refuse(o->container, e, "%s", why.text)
 	                                        : 0;
 }
 
-int ff_file_open(const char *path, const struct model *m, const struct cache_info *m_info,
+int file_ff_open(const char *path, const struct model *m, const struct cache_info *m_info,
                  struct ff_file *out, struct err *e)
 {
 	*out = (struct ff_file){ 0 };
 	if (open_ff(path, m, m_info, out, e) == 0)
 		return 0;
-	ff_file_close(out);
+	file_ff_close(out);
 	return -1;
 }
 
-void ff_file_close(struct ff_file *f)
+void file_ff_close(struct ff_file *f)
 {
 	for (size_t i = 0; i < f->made.n; i++)
 		free(((void **)f->made.data)[i]);
 	free(f->made.data);
-	cache_names_free(f->surface_name, f->surfaces);
-	cache_names_free(f->light_name, f->scene.lights);
-	cache_info_free(&f->info);
-	container_close(f->container);
+	file_cache_names_free(f->surface_name, f->surfaces);
+	file_cache_names_free(f->light_name, f->scene.lights);
+	file_cache_info_free(&f->info);
+	file_container_close(f->container);
 	*f = (struct ff_file){ 0 };
 }
 
@@ -245,7 +245,7 @@ static char *side_name(const char *surface, int several, uint32_t nth, uint32_t 
 	return name;
 }
 
-char **ff_file_side_names(const struct ff_file *f, struct err *e)
+char **file_ff_side_names(const struct ff_file *f, struct err *e)
 {
 	const size_t sides = 2 * f->scene.patches;
 	char **name = mem_new(sides, sizeof *name, "names of patch-sides", e);
@@ -265,6 +265,6 @@ char **ff_file_side_names(const struct ff_file *f, struct err *e)
 	free(so_far);
 	if (!failed)
 		return name;
-	cache_names_free(name, sides);
+	file_cache_names_free(name, sides);
 	return NULL;
 }

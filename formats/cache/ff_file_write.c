@@ -74,8 +74,8 @@ static int begin(struct ff_writer *w, enum grown a, struct err *e)
 	enum dtype type = a == VALUE && w->f64 ? DT_F64
 	                : a == COLUMN && w->narrow_columns ? DT_U16 : declared[a].type;
 
-	w->array[a].handle = container_array(w->container, declared[a].name, type,
-	                                     columns == 1 ? 1 : 2, shape, e);
+	w->array[a].handle = file_container_array(w->container, declared[a].name, type,
+	                                          columns == 1 ? 1 : 2, shape, e);
 	return w->array[a].handle < 0 ? -1 : 0;
 }
 
@@ -115,8 +115,8 @@ static int write_left_out(struct ff_writer *w, enum grown a, struct err *e)
 {
 	for (uint64_t i = 0; i < w->array[a].left_out; i++) {
 		uint64_t value = usual(a, i);
-		if (container_write(w->container, w->array[a].handle, &value,
-		                    dtype_size(declared[a].type), e))
+		if (file_container_write(w->container, w->array[a].handle, &value,
+		                         file_dtype_size(declared[a].type), e))
 			return -1;
 	}
 	return 0;
@@ -131,7 +131,7 @@ static int put(struct ff_writer *w, enum grown a, const void *data, size_t n, si
 	}
 	if (w->array[a].handle < 0 && (begin(w, a, e) || write_left_out(w, a, e)))
 		return -1;
-	return container_write(w->container, w->array[a].handle, data, n * size, e);
+	return file_container_write(w->container, w->array[a].handle, data, n * size, e);
 }
 
 /* ---- the model ---- */
@@ -139,18 +139,18 @@ static int put(struct ff_writer *w, enum grown a, const void *data, size_t n, si
 /* Patch sides and starts, if they are not what they are taken for. */
 static int put_patches(struct ff_writer *w, const struct model *m, struct err *e)
 {
-	uint8_t *sides = mem_new(m->patches, 1, "patch sides", e);
-	const uint64_t n = m->patches, n1 = n + 1;
-	int plain = 1, even = m->elements % m->patches == 0, bad = !sides;
+	uint8_t *sides = mem_new(m->patch.n, 1, "patch sides", e);
+	const uint64_t n = m->patch.n, n1 = n + 1;
+	int plain = 1, even = m->element.n % m->patch.n == 0, bad = !sides;
 
-	for (size_t p = 0; sides && p < m->patches; p++) {
+	for (size_t p = 0; sides && p < m->patch.n; p++) {
 		sides[p] = model_side_modelled(m, (uint32_t)(2 * p + 1)) ? 3 : 1;
 		plain &= sides[p] == 1;
-		even &= m->patch_start[p] == m->elements / m->patches * p;
+		even &= m->patch.start[p] == m->element.n / m->patch.n * p;
 	}
 	bad = bad ||
-	      (!even && container_put(w->container, "patch_start", DT_U32, 1, &n1, m->patch_start, e)) ||
-	      (!plain && container_put(w->container, "patch_sides", DT_U8, 1, &n, sides, e));
+	      (!even && file_container_put(w->container, "patch_start", DT_U32, 1, &n1, m->patch.start, e)) ||
+	      (!plain && file_container_put(w->container, "patch_sides", DT_U8, 1, &n, sides, e));
 	free(sides);
 	return bad ? -1 : 0;
 }
@@ -158,20 +158,20 @@ static int put_patches(struct ff_writer *w, const struct model *m, struct err *e
 /* Keeps what makes the file readable without its .mesh. */
 static int put_scene(struct ff_writer *w, const struct model *m, struct err *e)
 {
-	const uint64_t n = m->patches, five = 5;
-	const uint64_t counts[5] = { n, m->elements, m->material.n, m->surface.n, m->light.n };
+	const uint64_t n = m->patch.n, five = 5;
+	const uint64_t counts[5] = { n, m->element.n, m->material.n, m->surface.n, m->light.n };
 
-	return container_put(w->container, "patch_area", DT_F64, 1, &n, m->patch_area, e) ||
-	       container_put(w->container, "model_counts", DT_U64, 1, &five, counts, e) ||
-	       container_put(w->container, "patch_surface", DT_U32, 1, &n, m->patch_surface, e) ||
+	return file_container_put(w->container, "patch_area", DT_F64, 1, &n, m->patch.area, e) ||
+	       file_container_put(w->container, "model_counts", DT_U64, 1, &five, counts, e) ||
+	       file_container_put(w->container, "patch_surface", DT_U32, 1, &n, m->patch.surface, e) ||
 	       put_patches(w, m, e) ||
-	       container_meta(w->container, "receivers", w->to_patches ? "patches" : "elements", e) ||
-	       cache_write_names(w->container, "materials", m->material.name, m->material.n, e) ||
-	       cache_write_names(w->container, "surfaces", m->surface.name, m->surface.n, e) ||
-	       cache_write_names(w->container, "lights", m->light.name, m->light.n, e) ? -1 : 0;
+	       file_container_meta(w->container, "receivers", w->to_patches ? "patches" : "elements", e) ||
+	       file_cache_write_names(w->container, "materials", m->material.name, m->material.n, e) ||
+	       file_cache_write_names(w->container, "surfaces", m->surface.name, m->surface.n, e) ||
+	       file_cache_write_names(w->container, "lights", m->light.name, m->light.n, e) ? -1 : 0;
 }
 
-struct ff_writer *ff_file_create(const char *path, const struct model *m, int f64,
+struct ff_writer *file_ff_create(const char *path, const struct model *m, int f64,
                                  int to_patches, struct err *e)
 {
 	struct ff_writer *w = mem_new(1, sizeof *w, path, e);
@@ -182,24 +182,24 @@ struct ff_writer *ff_file_create(const char *path, const struct model *m, int f6
 	w->m = m;
 	w->f64 = f64;
 	w->to_patches = to_patches;
-	w->narrow_columns = (to_patches ? m->patches : m->elements) <= (UINT16_MAX + 1) / 2;
-	cache_ids(m, &ids);
+	w->narrow_columns = (to_patches ? m->patch.n : m->element.n) <= (UINT16_MAX + 1) / 2;
+	file_cache_ids(m, &ids);
 	memcpy(w->geometry_id, ids.geometry_id, sizeof w->geometry_id);
-	w->container = container_create(path, e);
+	w->container = file_container_create(path, e);
 	if (w->container && declare(w, e) == 0 && put_scene(w, m, e) == 0)
 		return w;
-	ff_file_abandon(w);
+	file_ff_abandon(w);
 	return NULL;
 }
 
-void ff_file_abandon(struct ff_writer *w)
+void file_ff_abandon(struct ff_writer *w)
 {
 	if (!w)
 		return;
-	container_abandon(w->container);
+	file_container_abandon(w->container);
 	free(w->shifted.data);
 	free(w->narrow.data);
-	ff_packed_free(&w->packed);
+	file_ff_packed_free(&w->packed);
 	free(w);
 }
 
@@ -208,7 +208,7 @@ static int put_starts(struct ff_writer *w, enum grown a, const uint64_t *start, 
                       uint64_t base, struct err *e)
 {
 	w->shifted.n = 0;
-	if (vec_reserve(&w->shifted, n, sizeof *start, e))
+	if (mem_reserve(&w->shifted, n, sizeof *start, e))
 		return -1;
 	uint64_t *out = w->shifted.data;
 	for (size_t i = 0; i < n; i++)
@@ -220,13 +220,13 @@ static int put_link_rows(struct ff_writer *w, const struct ff *b, struct err *e)
 {
 	w->shifted.n = 0;
 	/* The scratch holds 64-bit starts too: its unit stays 8 bytes. */
-	if (vec_reserve(&w->shifted, b->links, sizeof(uint64_t), e))
+	if (mem_reserve(&w->shifted, b->link.n, sizeof(uint64_t), e))
 		return -1;
 	uint32_t *out = w->shifted.data;
-	for (size_t i = 0; i < 2 * b->links; i++)
-		out[i] = b->link_row[i] == FF_NO_ROW ? FF_NO_ROW
-		                                     : b->link_row[i] + (uint32_t)w->rows;
-	return put(w, LINK_ROW, out, 2 * b->links, sizeof *out, e);
+	for (size_t i = 0; i < 2 * b->link.n; i++)
+		out[i] = b->link.row[i] == FF_NO_ROW ? FF_NO_ROW
+		                                     : b->link.row[i] + (uint32_t)w->rows;
+	return put(w, LINK_ROW, out, 2 * b->link.n, sizeof *out, e);
 }
 
 static int put_values(struct ff_writer *w, const struct ff *b, struct err *e)
@@ -242,32 +242,32 @@ static int put_rows_and_blocks(struct ff_writer *w, const struct ff *b, struct e
 		const void *data;
 		size_t n, size;
 	} plain[] = {
-		{ ROW_SCALE, b->row_scale, b->rows, sizeof *b->row_scale },
-		{ ROW_RESIDUAL, b->row_residual, b->rows, sizeof *b->row_residual },
-		{ ROW_ERROR, b->row_error, b->rows, sizeof *b->row_error },
-		{ ROW_SIDE, b->row_side, b->rows, sizeof *b->row_side },
-		{ ROW_SAMPLES, b->row_samples, b->rows, sizeof *b->row_samples },
-		{ ROW_KIND, b->row_kind, b->rows, sizeof *b->row_kind },
-		{ BLOCK_CHAIN, b->block_chain, b->blocks, sizeof *b->block_chain },
-		{ BLOCK_ESCAPE, b->block_escape, b->blocks, sizeof *b->block_escape },
-		{ BLOCK_BLACK, b->block_black, b->blocks, sizeof *b->block_black },
-		{ BLOCK_LOST, b->block_lost, b->blocks, sizeof *b->block_lost },
-		{ BLOCK_CUT, b->block_cut, b->blocks, sizeof *b->block_cut },
-		{ ARRIVAL_TARGET, b->arrival_target, b->arrivals, sizeof *b->arrival_target },
-		{ ARRIVAL_DIRECTION, b->arrival_direction, b->arrivals, 3 * sizeof(float) },
-		{ LINK_TARGET, b->link_target, b->links, sizeof *b->link_target },
-		{ LINK_SOURCE, b->link_source, b->links, sizeof *b->link_source },
-		{ LINK_LAST, b->link_last, b->links, sizeof *b->link_last },
-		{ LINK_CHAIN, b->link_chain, b->links, sizeof *b->link_chain },
-		{ LINK_DIRECTION, b->link_direction, b->links, 3 * sizeof(float) },
+		{ ROW_SCALE, b->row.scale, b->row.n, sizeof *b->row.scale },
+		{ ROW_RESIDUAL, b->row.residual, b->row.n, sizeof *b->row.residual },
+		{ ROW_ERROR, b->row.error, b->row.n, sizeof *b->row.error },
+		{ ROW_SIDE, b->row.side, b->row.n, sizeof *b->row.side },
+		{ ROW_SAMPLES, b->row.samples, b->row.n, sizeof *b->row.samples },
+		{ ROW_KIND, b->row.kind, b->row.n, sizeof *b->row.kind },
+		{ BLOCK_CHAIN, b->block.chain, b->block.n, sizeof *b->block.chain },
+		{ BLOCK_ESCAPE, b->block.escape, b->block.n, sizeof *b->block.escape },
+		{ BLOCK_BLACK, b->block.black, b->block.n, sizeof *b->block.black },
+		{ BLOCK_LOST, b->block.lost, b->block.n, sizeof *b->block.lost },
+		{ BLOCK_CUT, b->block.cut, b->block.n, sizeof *b->block.cut },
+		{ ARRIVAL_TARGET, b->arrival.target, b->arrival.n, sizeof *b->arrival.target },
+		{ ARRIVAL_DIRECTION, b->arrival.direction, b->arrival.n, 3 * sizeof(float) },
+		{ LINK_TARGET, b->link.target, b->link.n, sizeof *b->link.target },
+		{ LINK_SOURCE, b->link.source, b->link.n, sizeof *b->link.source },
+		{ LINK_LAST, b->link.last, b->link.n, sizeof *b->link.last },
+		{ LINK_CHAIN, b->link.chain, b->link.n, sizeof *b->link.chain },
+		{ LINK_DIRECTION, b->link.direction, b->link.n, 3 * sizeof(float) },
 	};
 
 	for (size_t i = 0; i < sizeof plain / sizeof *plain; i++)
 		if (put(w, plain[i].array, plain[i].data, plain[i].n, plain[i].size, e))
 			return -1;
-	return put_starts(w, ROW_BLOCK, b->row_block, b->rows, w->blocks, e) ||
-	       put_starts(w, BLOCK_START, b->block_start, b->blocks, w->entries, e) ||
-	       put_starts(w, BLOCK_ARRIVAL, b->block_arrival, b->blocks, w->arrivals, e) ? -1 : 0;
+	return put_starts(w, ROW_BLOCK, b->row.block, b->row.n, w->blocks, e) ||
+	       put_starts(w, BLOCK_START, b->block.start, b->block.n, w->entries, e) ||
+	       put_starts(w, BLOCK_ARRIVAL, b->block.arrival, b->block.n, w->arrivals, e) ? -1 : 0;
 }
 
 static int put_words(struct ff_writer *w, const struct vec *word, struct err *e)
@@ -277,7 +277,7 @@ static int put_words(struct ff_writer *w, const struct vec *word, struct err *e)
 	if (!w->narrow_columns)
 		return put(w, COLUMN, from, word->n, sizeof *from, e);
 	w->narrow.n = 0;
-	if (vec_reserve(&w->narrow, word->n, sizeof(uint16_t), e))
+	if (mem_reserve(&w->narrow, word->n, sizeof(uint16_t), e))
 		return -1;
 	uint16_t *to = w->narrow.data;
 	for (size_t i = 0; i < word->n; i++)
@@ -287,70 +287,70 @@ static int put_words(struct ff_writer *w, const struct vec *word, struct err *e)
 
 static int put_columns(struct ff_writer *w, const struct ff *b, struct err *e)
 {
-	return ff_pack_columns(b, &w->packed, e) ||
-	       put(w, BLOCK_COLUMN, w->packed.block_column.data, b->blocks, sizeof(uint64_t), e) ||
+	return file_ff_pack_columns(b, &w->packed, e) ||
+	       put(w, BLOCK_COLUMN, w->packed.block_column.data, b->block.n, sizeof(uint64_t), e) ||
 	       put_words(w, &w->packed.word, e) ? -1 : 0;
 }
 
-int ff_file_append(struct ff_writer *w, const struct ff *batch, struct err *e)
+int file_ff_append(struct ff_writer *w, const struct ff *batch, struct err *e)
 {
 	struct ff by_patch;
 
 	if (batch->entries && (w->f64 ? !batch->value64 : !batch->value))
 		return err_set(e, "%s: array value: a batch has the other precision",
-		               container_writer_path(w->container));
+		               file_container_writer_path(w->container));
 	if (batch->to_patches && !w->to_patches)
 		return err_set(e, "%s: array column: a batch has patches, not elements",
-		               container_writer_path(w->container));
+		               file_container_writer_path(w->container));
 	if (w->to_patches && !batch->to_patches) {
-		if (ff_sum_by_patch(batch, w->m, &w->packed, &by_patch, e))
+		if (file_ff_sum_by_patch(batch, w->m, &w->packed, &by_patch, e))
 			return -1;
 		batch = &by_patch;
 	}
-	if (batch->rows >= FF_NO_ROW - w->rows)
+	if (batch->row.n >= FF_NO_ROW - w->rows)
 		return err_set(e, "%s: more than 2^32 rows; compute it in parts",
-		               container_writer_path(w->container));
+		               file_container_writer_path(w->container));
 	if (put_rows_and_blocks(w, batch, e) || put_columns(w, batch, e) ||
 	    put_values(w, batch, e) || put_link_rows(w, batch, e))
 		return -1;
-	w->rows += batch->rows;
-	w->blocks += batch->blocks;
+	w->rows += batch->row.n;
+	w->blocks += batch->block.n;
 	w->entries += batch->entries;
-	w->arrivals += batch->arrivals;
+	w->arrivals += batch->arrival.n;
 	return 0;
 }
 
 static int put_table(struct ff_writer *w, const struct ff *whole, struct err *e)
 {
 	struct container_writer *c = w->container;
-	const uint64_t starts = whole->chains + 1, events = whole->chain_events, four = 4, one = 1;
-	const uint32_t part[4] = { whole->patch_begin, whole->patch_end, whole->part,
-	                           whole->parts };
+	const uint64_t starts = whole->chain.n + 1, events = whole->chain.events, four = 4, one = 1;
+	const uint32_t part[4] = { whole->patch_begin, whole->patch_end, whole->shard,
+	                           whole->shards };
 	const uint64_t end[3] = { w->blocks, w->entries, w->arrivals };
 
 	return put(w, ROW_BLOCK, &end[0], 1, sizeof *end, e) ||
 	       put(w, BLOCK_START, &end[1], 1, sizeof *end, e) ||
 	       put(w, BLOCK_ARRIVAL, &end[2], 1, sizeof *end, e) ||
-	       container_put(c, "chain_start", DT_U64, 1, &starts, whole->chain_start, e) ||
-	       (events && (container_put(c, "chain_event", DT_U32, 1, &events, whole->chain_event, e) ||
-	                   container_put(c, "chain_count", DT_U32, 1, &events, whole->chain_count, e))) ||
-	       (whole->chain_most != 1 &&
-	        container_put(c, "chain_most", DT_U32, 1, &one, &whole->chain_most, e)) ||
-	       container_put(c, "part", DT_U32, 1, &four, part, e) ? -1 : 0;
+	       file_container_put(c, "chain_start", DT_U64, 1, &starts, whole->chain.start, e) ||
+	       (events && (file_container_put(c, "chain_event", DT_U32, 1, &events, whole->chain.event, e) ||
+	                   file_container_put(c, "chain_count", DT_U32, 1, &events, whole->chain.count, e))) ||
+	       (whole->chain.most != 1 &&
+	        file_container_put(c, "chain_most", DT_U32, 1, &one, &whole->chain.most, e)) ||
+	       file_container_put(c, "part", DT_U32, 1, &four, part, e) ? -1 : 0;
 }
 
-int ff_file_finish(struct ff_writer *w, const struct ff *whole, const struct cache_info *i,
+int file_ff_finish(struct ff_writer *w, const struct ff *whole, const struct cache_info *i,
                    struct err *e)
 {
 	struct cache_info info = *i;
 
 	memcpy(info.geometry_id, w->geometry_id, sizeof info.geometry_id);
 	info.material_id[0] = info.camera_id[0] = '\0';
-	int failed = put_table(w, whole, e) || cache_write_info(w->container, FORMAT, &info, e);
+	int failed = put_table(w, whole, e) || file_cache_write_info(w->container, FORMAT, &info, e);
 	if (!failed) {
-		failed = container_finish(w->container, e);
+		failed = file_container_finish(w->container, e);
 		w->container = NULL;
 	}
-	ff_file_abandon(w);
+	file_ff_abandon(w);
 	return failed ? -1 : 0;
 }

@@ -5,9 +5,9 @@
 #include "formats/cache/cache.h"
 #include "lib/data/solution.h"
 
-int rad_file_write(const char *path, const struct model *m, const struct solution *s,
+int file_rad_write(const char *path, const struct model *m, const struct solution *s,
                    const struct cache_info *i, struct err *e);
-int rad_file_read(const char *path, struct model *m, struct solution *s,
+int file_rad_read(const char *path, struct model *m, struct solution *s,
                   struct cache_info *i, struct err *e);
 
 #endif

@@ -48,7 +48,7 @@ static void release_temporary(struct temporary *t)
 	atomic_store(&t->claimed, 0);
 }
 
-void atomic_file_remove_temporaries(void)
+void file_atomic_remove_temporaries(void)
 {
 	for (int i = 0; i < TEMPORARIES; i++)
 		if (atomic_load(&temporaries[i].in_use))
@@ -122,7 +122,7 @@ static char *copy_string(const char *s, struct err *e)
 	return copy ? memcpy(copy, s, bytes) : NULL;
 }
 
-struct atomic_file *atomic_file_create(const char *path, struct err *e)
+struct atomic_file *file_atomic_create(const char *path, struct err *e)
 {
 	struct atomic_file *f = mem_new(1, sizeof *f, "an output file", e);
 
@@ -135,11 +135,11 @@ struct atomic_file *atomic_file_create(const char *path, struct err *e)
 		return f;
 	if (f->target)
 		failed(f, "create", e);
-	atomic_file_abandon(f);
+	file_atomic_abandon(f);
 	return NULL;
 }
 
-int atomic_file_write(struct atomic_file *f, const void *data, size_t bytes, struct err *e)
+int file_atomic_write(struct atomic_file *f, const void *data, size_t bytes, struct err *e)
 {
 	const char *p = data;
 
@@ -156,12 +156,12 @@ int atomic_file_write(struct atomic_file *f, const void *data, size_t bytes, str
 	return 0;
 }
 
-int atomic_file_descriptor(const struct atomic_file *f)
+int file_atomic_descriptor(const struct atomic_file *f)
 {
 	return f->fd;
 }
 
-int atomic_file_direct(const struct atomic_file *f)
+int file_atomic_direct(const struct atomic_file *f)
 {
 	return f->temporary == NULL;
 }
@@ -174,7 +174,7 @@ static int close_file(struct atomic_file *f)
 	return fd < 0 || fd == STDOUT_FILENO ? 0 : close(fd);
 }
 
-int atomic_file_finish(struct atomic_file *f, struct err *e)
+int file_atomic_finish(struct atomic_file *f, struct err *e)
 {
 	int status = 0;
 
@@ -190,11 +190,11 @@ int atomic_file_finish(struct atomic_file *f, struct err *e)
 			f->temporary = NULL;
 		}
 	}
-	atomic_file_abandon(f);
+	file_atomic_abandon(f);
 	return status;
 }
 
-void atomic_file_abandon(struct atomic_file *f)
+void file_atomic_abandon(struct atomic_file *f)
 {
 	if (!f)
 		return;
@@ -208,20 +208,20 @@ void atomic_file_abandon(struct atomic_file *f)
 	free(f);
 }
 
-int atomic_file_put(const char *path, const void *data, size_t bytes, struct err *e)
+int file_atomic_put(const char *path, const void *data, size_t bytes, struct err *e)
 {
-	struct atomic_file *f = atomic_file_create(path, e);
+	struct atomic_file *f = file_atomic_create(path, e);
 
 	if (!f)
 		return -1;
-	if (atomic_file_write(f, data, bytes, e)) {
-		atomic_file_abandon(f);
+	if (file_atomic_write(f, data, bytes, e)) {
+		file_atomic_abandon(f);
 		return -1;
 	}
-	return atomic_file_finish(f, e);
+	return file_atomic_finish(f, e);
 }
 
-int atomic_file_check(const char *path, struct err *e)
+int file_atomic_check(const char *path, struct err *e)
 {
 	const char *slash = strrchr(path, '/');
 	char *directory;

@@ -10,31 +10,31 @@ struct atomic_file;
 
 /* 0 if the directory of `path` can be written to, else -1 and e: better known before
  * the work than after. */
-int atomic_file_check(const char *path, struct err *e);
+int file_atomic_check(const char *path, struct err *e);
 
 /* Begins `path` ("-" = stdout) in a temporary file of the same directory, with
  * the old file's permissions. A target that is not a regular file is written
  * directly; a symbolic link is followed. NULL and e on failure. */
-struct atomic_file *atomic_file_create(const char *path, struct err *e);
+struct atomic_file *file_atomic_create(const char *path, struct err *e);
 
 /* Appends. 0, or -1 and e; after a failure only abandon is left. */
-int atomic_file_write(struct atomic_file *f, const void *data, size_t bytes, struct err *e);
+int file_atomic_write(struct atomic_file *f, const void *data, size_t bytes, struct err *e);
 
 /* The descriptor, for callers that write by themselves. It cannot be sought in
- * where atomic_file_direct() is true. */
-int atomic_file_descriptor(const struct atomic_file *f);
-int atomic_file_direct(const struct atomic_file *f);
+ * where file_atomic_direct() is true. */
+int file_atomic_descriptor(const struct atomic_file *f);
+int file_atomic_direct(const struct atomic_file *f);
 
 /* fsyncs and renames, so that the path holds the new bytes. Frees f in any case. */
-int atomic_file_finish(struct atomic_file *f, struct err *e);
+int file_atomic_finish(struct atomic_file *f, struct err *e);
 
 /* Gives up: the old file stays as it was. Frees f (NULL allowed). */
-void atomic_file_abandon(struct atomic_file *f);
+void file_atomic_abandon(struct atomic_file *f);
 
 /* Creates, writes and finishes at once. */
-int atomic_file_put(const char *path, const void *data, size_t bytes, struct err *e);
+int file_atomic_put(const char *path, const void *data, size_t bytes, struct err *e);
 
 /* Removes the temporary files of unfinished output. Async-signal-safe. */
-void atomic_file_remove_temporaries(void);
+void file_atomic_remove_temporaries(void);
 
 #endif

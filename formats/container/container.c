@@ -14,17 +14,17 @@ static const struct {
 	[DT_U16] = { "U16", 2 }, [DT_U8] = { "U8", 1 },
 };
 
-size_t dtype_size(enum dtype t)
+size_t file_dtype_size(enum dtype t)
 {
 	return dtypes[t].size;
 }
 
-const char *dtype_name(enum dtype t)
+const char *file_dtype_name(enum dtype t)
 {
 	return dtypes[t].name;
 }
 
-char *container_header_slot(const char *json, size_t bytes)
+char *file_container_header_slot(const char *json, size_t bytes)
 {
 	static const char key[] = "\"" CONTAINER_HEADER_DIGEST "\":\"";
 	const size_t length = sizeof key - 1;
@@ -39,16 +39,16 @@ char *container_header_slot(const char *json, size_t bytes)
 	return NULL;
 }
 
-void container_header_digest(const char *json, size_t bytes, const char *slot,
-                             char hex[CONTAINER_HEX + 1])
+void file_container_header_digest(const char *json, size_t bytes, const char *slot,
+                                  char hex[CONTAINER_HEX + 1])
 {
-	struct digest *d = digest_new();
+	struct digest *d = file_digest_new();
 	size_t before = (size_t)(slot - json);
 	uint64_t prefix = bytes;
 
-	digest_bytes(d, &prefix, sizeof prefix);
-	digest_bytes(d, json, before);
-	digest_bytes(d, CONTAINER_BLANK_DIGEST, CONTAINER_HEX);
-	digest_bytes(d, slot + CONTAINER_HEX, bytes - before - CONTAINER_HEX);
-	digest_end(d, hex);
+	file_digest_bytes(d, &prefix, sizeof prefix);
+	file_digest_bytes(d, json, before);
+	file_digest_bytes(d, CONTAINER_BLANK_DIGEST, CONTAINER_HEX);
+	file_digest_bytes(d, slot + CONTAINER_HEX, bytes - before - CONTAINER_HEX);
+	file_digest_end(d, hex);
 }

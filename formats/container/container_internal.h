@@ -22,10 +22,10 @@ enum {
 /* Where the 32 digits of the header's own digest stand in its JSON text (written
  * without spaces), or NULL. A quotation mark inside a JSON string is escaped, so
  * the text looked for cannot stand inside another value. */
-char *container_header_slot(const char *json, size_t bytes);
+char *file_container_header_slot(const char *json, size_t bytes);
 
 /* Digest of the length prefix and the header with that slot taken as blank. */
-void container_header_digest(const char *json, size_t bytes, const char *slot,
-                             char hex[CONTAINER_HEX + 1]);
+void file_container_header_digest(const char *json, size_t bytes, const char *slot,
+                                  char hex[CONTAINER_HEX + 1]);
 
 #endif

@@ -46,9 +46,9 @@ static void make_printable(char *text)
 			*text = '?';
 }
 
-int container_refuse(const struct container *c, struct err *e, const char *format, ...)
+int file_container_refuse(const struct container *c, struct err *e, const char *format, ...)
 {
-	const char *kind = container_get_meta(c, "format"), *tool = NULL;
+	const char *kind = file_container_get_meta(c, "format"), *tool = NULL;
 	char text[512];
 	va_list ap;
 
@@ -130,7 +130,7 @@ static int collect_metadata(struct container *c, struct err *e)
 		return -1;
 	json_object_foreach(meta, key, value) {
 		if (!json_is_string(value))
-			return container_refuse(c, e, "header: metadata %.100s is not a string", key);
+			return file_container_refuse(c, e, "header: metadata %.100s is not a string", key);
 		c->meta[c->metas++] = (struct pair){ key, json_string_value(value) };
 	}
 	return 0;
@@ -138,7 +138,7 @@ static int collect_metadata(struct container *c, struct err *e)
 
 static int check_format(const struct container *c, const char *format, struct err *e)
 {
-	const char *have = container_get_meta(c, "format");
+	const char *have = file_container_get_meta(c, "format");
 
 	if (!have || strncmp(have, "twopass.", 8) != 0)
 		return err_set(e, "%s: a safetensors file of another program; name a .mesh, .ff or "
@@ -155,14 +155,14 @@ static int check_format(const struct container *c, const char *format, struct er
 
 static int check_header_digest(const struct container *c, struct err *e)
 {
-	const char *json = header_json(c), *slot = container_header_slot(json, c->header);
+	const char *json = header_json(c), *slot = file_container_header_slot(json, c->header);
 	char hex[CONTAINER_HEX + 1];
 
 	if (!slot)
-		return container_refuse(c, e, "header: it has no digest");
-	container_header_digest(json, c->header, slot, hex);
+		return file_container_refuse(c, e, "header: it has no digest");
+	file_container_header_digest(json, c->header, slot, hex);
 	if (strncmp(slot, hex, CONTAINER_HEX) != 0)
-		return container_refuse(c, e, "header: damaged (its digest does not match)");
+		return file_container_refuse(c, e, "header: damaged (its digest does not match)");
 	return 0;
 }
 
@@ -173,7 +173,7 @@ static int parse_dtype(const json_t *text, enum dtype *t)
 	const char *name = json_string_value(text);
 
 	for (int i = 0; name && i < DT_COUNT; i++)
-		if (strcmp(name, dtype_name((enum dtype)i)) == 0) {
+		if (strcmp(name, file_dtype_name((enum dtype)i)) == 0) {
 			*t = (enum dtype)i;
 			return 0;
 		}
@@ -197,7 +197,7 @@ static int parse_shape(const json_t *shape, struct container_view *v, uint64_t *
 		if (__builtin_mul_overflow(v->count, v->shape[d], &v->count))
 			return -1;
 	}
-	return __builtin_mul_overflow(v->count, dtype_size(v->type), bytes) ? -1 : 0;
+	return __builtin_mul_overflow(v->count, file_dtype_size(v->type), bytes) ? -1 : 0;
 }
 
 static int parse_view(struct container *c, const char *name, const json_t *entry,
@@ -209,22 +209,22 @@ static int parse_view(struct container *c, const char *name, const json_t *entry
 
 	v->name = name;
 	if (parse_dtype(json_object_get(entry, "dtype"), &v->type))
-		return container_refuse(c, e, "array %.100s: unknown dtype", name);
+		return file_container_refuse(c, e, "array %.100s: unknown dtype", name);
 	if (parse_shape(json_object_get(entry, "shape"), v, &bytes))
-		return container_refuse(c, e, "array %.100s: impossible shape", name);
+		return file_container_refuse(c, e, "array %.100s: impossible shape", name);
 	if (json_array_size(offsets) != 2 || !json_is_integer(from) || !json_is_integer(to) ||
 	    json_integer_value(from) < 0 || json_integer_value(to) < json_integer_value(from))
-		return container_refuse(c, e, "array %.100s: impossible data_offsets", name);
+		return file_container_refuse(c, e, "array %.100s: impossible data_offsets", name);
 	uint64_t begin = (uint64_t)json_integer_value(from);
 	uint64_t end = (uint64_t)json_integer_value(to);
 	if (end - begin != bytes)
-		return container_refuse(c, e, "array %.100s: %" PRIu64 " bytes, its shape needs %"
-		                        PRIu64, name, end - begin, bytes);
+		return file_container_refuse(c, e, "array %.100s: %" PRIu64 " bytes, its shape needs %"
+		                             PRIu64, name, end - begin, bytes);
 	if (end > room)
-		return container_refuse(c, e, "array %.100s: truncated: it ends at byte %" PRIu64
-		                        " of the data, the file has %" PRIu64, name, end, room);
-	if (begin % dtype_size(v->type))
-		return container_refuse(c, e, "array %.100s: not aligned to its type", name);
+		return file_container_refuse(c, e, "array %.100s: truncated: it ends at byte %" PRIu64
+		                             " of the data, the file has %" PRIu64, name, end, room);
+	if (begin % file_dtype_size(v->type))
+		return file_container_refuse(c, e, "array %.100s: not aligned to its type", name);
 	v->data = header_json(c) + c->header + begin;
 	return 0;
 }
@@ -249,14 +249,14 @@ static int check_layout(struct container *c, struct err *e)
 	for (size_t i = 0; i < c->views; i++) {
 		const struct container_view *v = &c->view[i];
 		if ((const char *)v->data != at)
-			return container_refuse(c, e, "array %.100s: %s", v->name,
-			                        (const char *)v->data < at ?
-			                        "overlaps another" : "there is a gap before it");
-		at += v->count * dtype_size(v->type);
+			return file_container_refuse(c, e, "array %.100s: %s", v->name,
+			                             (const char *)v->data < at ?
+			                             "overlaps another" : "there is a gap before it");
+		at += v->count * file_dtype_size(v->type);
 	}
 	if (at != end)
-		return container_refuse(c, e, "%lld bytes follow the last array",
-		                        (long long)(end - at));
+		return file_container_refuse(c, e, "%lld bytes follow the last array",
+		                             (long long)(end - at));
 	return 0;
 }
 
@@ -278,7 +278,7 @@ static int collect_arrays(struct container *c, struct err *e)
 	return check_layout(c, e);
 }
 
-struct container *container_open(const char *path, const char *format, struct err *e)
+struct container *file_container_open(const char *path, const char *format, struct err *e)
 {
 	struct container *c = mem_new(1, sizeof *c, path, e);
 
@@ -290,11 +290,11 @@ struct container *container_open(const char *path, const char *format, struct er
 	         check_format(c, format, e) == 0 && check_header_digest(c, e) == 0 &&
 	         collect_arrays(c, e) == 0)
 		return c;
-	container_close(c);
+	file_container_close(c);
 	return NULL;
 }
 
-void container_close(struct container *c)
+void file_container_close(struct container *c)
 {
 	if (!c)
 		return;
@@ -309,39 +309,39 @@ void container_close(struct container *c)
 
 /* ---- what is in it ---- */
 
-const char *container_path(const struct container *c)
+const char *file_container_path(const struct container *c)
 {
 	return c->path;
 }
 
-const char *container_get_meta(const struct container *c, const char *key)
+const char *file_container_get_meta(const struct container *c, const char *key)
 {
 	return json_string_value(json_object_get(json_object_get(c->json, CONTAINER_METADATA),
 	                                         key));
 }
 
-size_t container_metas(const struct container *c)
+size_t file_container_metas(const struct container *c)
 {
 	return c->metas;
 }
 
-const char *container_meta_at(const struct container *c, size_t i, const char **value)
+const char *file_container_meta_at(const struct container *c, size_t i, const char **value)
 {
 	*value = c->meta[i].value;
 	return c->meta[i].key;
 }
 
-size_t container_arrays(const struct container *c)
+size_t file_container_arrays(const struct container *c)
 {
 	return c->views;
 }
 
-const struct container_view *container_at(const struct container *c, size_t i)
+const struct container_view *file_container_at(const struct container *c, size_t i)
 {
 	return &c->view[i];
 }
 
-const struct container_view *container_find(const struct container *c, const char *name)
+const struct container_view *file_container_find(const struct container *c, const char *name)
 {
 	for (size_t i = 0; i < c->views; i++)
 		if (strcmp(c->view[i].name, name) == 0)
@@ -352,7 +352,7 @@ const struct container_view *container_find(const struct container *c, const cha
 /* "F64 [3,any]" */
 static void describe(char *text, size_t size, enum dtype t, int dims, const uint64_t *shape)
 {
-	size_t n = (size_t)snprintf(text, size, "%s [", dtype_name(t));
+	size_t n = (size_t)snprintf(text, size, "%s [", file_dtype_name(t));
 
 	for (int d = 0; d < dims && n < size; d++)
 		n += (size_t)(shape[d] == UINT64_MAX ?
@@ -362,16 +362,16 @@ static void describe(char *text, size_t size, enum dtype t, int dims, const uint
 		snprintf(text + n, size - n, "]");
 }
 
-const struct container_view *container_need(const struct container *c, const char *name,
-                                            enum dtype t, int dims, const uint64_t *shape,
-                                            struct err *e)
+const struct container_view *file_container_need(const struct container *c, const char *name,
+                                                 enum dtype t, int dims, const uint64_t *shape,
+                                                 struct err *e)
 {
-	const struct container_view *v = container_find(c, name);
+	const struct container_view *v = file_container_find(c, name);
 	int match = v && v->type == t && v->dims == dims;
 	char need[120], have[120];
 
 	if (!v) {
-		container_refuse(c, e, "array %s: missing", name);
+		file_container_refuse(c, e, "array %s: missing", name);
 		return NULL;
 	}
 	for (int d = 0; match && d < dims; d++)
@@ -380,7 +380,7 @@ const struct container_view *container_need(const struct container *c, const cha
 		return v;
 	describe(need, sizeof need, t, dims, shape);
 	describe(have, sizeof have, v->type, v->dims, v->shape);
-	container_refuse(c, e, "array %s: it is %s and should be %s", name, have, need);
+	file_container_refuse(c, e, "array %s: it is %s and should be %s", name, have, need);
 	return NULL;
 }
 
@@ -391,32 +391,32 @@ static const char *array_digest(const struct container *c, const struct containe
 	char key[256];
 
 	snprintf(key, sizeof key, CONTAINER_DIGEST "%s", v->name);
-	return container_get_meta(c, key);
+	return file_container_get_meta(c, key);
 }
 
-int container_verify(const struct container *c, const struct container_view *v,
-                     struct err *e)
+int file_container_verify(const struct container *c, const struct container_view *v,
+                          struct err *e)
 {
 	const char *stored = array_digest(c, v);
-	struct digest *d = digest_new();
+	struct digest *d = file_digest_new();
 	char hex[CONTAINER_HEX + 1];
 
-	digest_bytes(d, v->data, v->count * dtype_size(v->type));
-	digest_end(d, hex);
+	file_digest_bytes(d, v->data, v->count * file_dtype_size(v->type));
+	file_digest_end(d, hex);
 	if (!*hex)
 		return err_set(e, "%s: out of memory", c->path);
 	if (!stored)
-		return container_refuse(c, e, "array %.100s: it has no digest", v->name);
+		return file_container_refuse(c, e, "array %.100s: it has no digest", v->name);
 	if (strcmp(stored, hex) != 0)
-		return container_refuse(c, e, "array %.100s: damaged (its digest does not match)",
-		                        v->name);
+		return file_container_refuse(c, e, "array %.100s: damaged (its digest does not match)",
+		                             v->name);
 	return 0;
 }
 
-int container_verify_all(const struct container *c, struct err *e)
+int file_container_verify_all(const struct container *c, struct err *e)
 {
 	for (size_t i = 0; i < c->views; i++)
-		if (container_verify(c, &c->view[i], e))
+		if (file_container_verify(c, &c->view[i], e))
 			return -1;
 	return 0;
 }
@@ -437,9 +437,9 @@ static int loose_key(const char *key)
 	       strcmp(key, "report") == 0;
 }
 
-void container_digest(const struct container *c, char hex[33])
+void file_container_digest(const struct container *c, char hex[33])
 {
-	struct digest *d = digest_new();
+	struct digest *d = file_digest_new();
 	struct pair *sorted = calloc(c->metas + 1, sizeof *sorted);
 
 	/* Array digests are metadata too. */
@@ -449,9 +449,9 @@ void container_digest(const struct container *c, char hex[33])
 		qsort(sorted, c->metas, sizeof *sorted, by_key);
 	for (size_t i = 0; sorted && i < c->metas; i++)
 		if (!loose_key(sorted[i].key)) {
-			digest_string(d, sorted[i].key);
-			digest_string(d, sorted[i].value);
+			file_digest_string(d, sorted[i].key);
+			file_digest_string(d, sorted[i].value);
 		}
 	free(sorted);
-	digest_end(d, hex);
+	file_digest_end(d, hex);
 }

@@ -38,7 +38,7 @@ static struct array *array_at(const struct container_writer *w, size_t i)
 	return (struct array *)w->arrays.data + i;
 }
 
-void container_abandon(struct container_writer *w)
+void file_container_abandon(struct container_writer *w)
 {
 	char hex[CONTAINER_HEX + 1];
 
@@ -49,18 +49,18 @@ void container_abandon(struct container_writer *w)
 		free(a->name);
 		free(a->buffer.data);
 		if (a->digest)
-			digest_end(a->digest, hex);
+			file_digest_end(a->digest, hex);
 		if (a->spool)
 			fclose(a->spool);
 	}
 	free(w->arrays.data);
 	json_decref(w->meta);
-	atomic_file_abandon(w->file);
+	file_atomic_abandon(w->file);
 	free(w->path);
 	free(w);
 }
 
-struct container_writer *container_create(const char *path, struct err *e)
+struct container_writer *file_container_create(const char *path, struct err *e)
 {
 	struct container_writer *w = mem_new(1, sizeof *w, path, e);
 
@@ -70,19 +70,19 @@ struct container_writer *container_create(const char *path, struct err *e)
 	w->meta = json_object();
 	if (!w->path || !w->meta)
 		err_set(e, "%s: out of memory", path);
-	else if ((w->file = atomic_file_create(path, e)))
+	else if ((w->file = file_atomic_create(path, e)))
 		return w;
-	container_abandon(w);
+	file_container_abandon(w);
 	return NULL;
 }
 
-const char *container_writer_path(const struct container_writer *w)
+const char *file_container_writer_path(const struct container_writer *w)
 {
 	return w->path;
 }
 
-int container_meta(struct container_writer *w, const char *key, const char *value,
-                   struct err *e)
+int file_container_meta(struct container_writer *w, const char *key, const char *value,
+                        struct err *e)
 {
 	json_t *text = json_string(value);
 
@@ -109,19 +109,19 @@ static int check_declaration(const struct container_writer *w, const char *name,
 	return 0;
 }
 
-int container_array(struct container_writer *w, const char *name, enum dtype t, int dims,
-                    const uint64_t *shape, struct err *e)
+int file_container_array(struct container_writer *w, const char *name, enum dtype t, int dims,
+                         const uint64_t *shape, struct err *e)
 {
 	struct array a = { .type = t, .dims = dims };
 
 	if (check_declaration(w, name, dims, e))
 		return -1;
 	memcpy(a.shape, shape, (size_t)dims * sizeof *shape);
-	if (vec_append(&w->arrays, &a, 1, sizeof a, e))
+	if (mem_append(&w->arrays, &a, 1, sizeof a, e))
 		return -1;
 	struct array *kept = array_at(w, w->arrays.n - 1);
 	kept->name = strdup(name);
-	kept->digest = digest_new();
+	kept->digest = file_digest_new();
 	if (!kept->name || !kept->digest)
 		return err_set(e, "%s: out of memory", w->path);
 	return (int)w->arrays.n - 1;
@@ -135,7 +135,7 @@ static FILE *spool_open(const struct container_writer *w, struct err *e)
 	const char *directory = slash ? w->path : ".";
 	char name[4096];
 
-	if (atomic_file_direct(w->file)) {
+	if (file_atomic_direct(w->file)) {
 		directory = scratch && *scratch ? scratch : "/tmp";
 		length = (int)strlen(directory);
 	}
@@ -168,12 +168,12 @@ static int spool_write(const struct container_writer *w, struct array *a, const 
 	return 0;
 }
 
-int container_write(struct container_writer *w, int array, const void *data, size_t bytes,
-                    struct err *e)
+int file_container_write(struct container_writer *w, int array, const void *data, size_t bytes,
+                         struct err *e)
 {
 	struct array *a = array_at(w, (size_t)array);
 
-	digest_bytes(a->digest, data, bytes);
+	file_digest_bytes(a->digest, data, bytes);
 	a->bytes += bytes;
 	if (bytes > BUFFER - a->buffer.n) {
 		if (spool_write(w, a, a->buffer.data, a->buffer.n, e))
@@ -182,21 +182,21 @@ int container_write(struct container_writer *w, int array, const void *data, siz
 		if (bytes >= BUFFER)
 			return spool_write(w, a, data, bytes, e);
 	}
-	return vec_append(&a->buffer, data, bytes, 1, e);
+	return mem_append(&a->buffer, data, bytes, 1, e);
 }
 
-int container_put(struct container_writer *w, const char *name, enum dtype t, int dims,
-                  const uint64_t *shape, const void *data, struct err *e)
+int file_container_put(struct container_writer *w, const char *name, enum dtype t, int dims,
+                       const uint64_t *shape, const void *data, struct err *e)
 {
-	int array = container_array(w, name, t, dims, shape, e);
-	size_t bytes = dtype_size(t);
+	int array = file_container_array(w, name, t, dims, shape, e);
+	size_t bytes = file_dtype_size(t);
 
 	if (array < 0)
 		return -1;
 	for (int d = 0; d < dims; d++)
 		if (__builtin_mul_overflow(bytes, shape[d], &bytes))
 			return err_set(e, "%s: array %s: too large", w->path, name);
-	return container_write(w, array, data, bytes, e);
+	return file_container_write(w, array, data, bytes, e);
 }
 
 /* ---- finishing ---- */
@@ -204,7 +204,7 @@ int container_put(struct container_writer *w, const char *name, enum dtype t, in
 /* Completes an open shape[0] and compares the shape with what was written. */
 static int close_array(struct container_writer *w, struct array *a, struct err *e)
 {
-	uint64_t row = dtype_size(a->type), bytes;
+	uint64_t row = file_dtype_size(a->type), bytes;
 
 	for (int d = 1; d < a->dims; d++)
 		if (__builtin_mul_overflow(row, a->shape[d], &row))
@@ -215,12 +215,12 @@ static int close_array(struct container_writer *w, struct array *a, struct err *
 		return err_set(e, "%s: array %s: %llu bytes were written, its shape needs %llu",
 		               w->path, a->name, (unsigned long long)a->bytes,
 		               (unsigned long long)bytes);
-	digest_end(a->digest, a->hex);
+	file_digest_end(a->digest, a->hex);
 	a->digest = NULL;
 	char key[256];
 	if (snprintf(key, sizeof key, CONTAINER_DIGEST "%s", a->name) >= (int)sizeof key)
 		return err_set(e, "%s: array %s: the name is too long", w->path, a->name);
-	return container_meta(w, key, a->hex, e);
+	return file_container_meta(w, key, a->hex, e);
 }
 
 /* Describes one array in the header and moves the offset behind it. */
@@ -232,7 +232,7 @@ static int describe(const struct container_writer *w, json_t *header, const stru
 
 	for (int d = 0; d < a->dims; d++)
 		json_array_append_new(shape, json_integer((json_int_t)a->shape[d]));
-	json_t *entry = json_pack("{s:s, s:o, s:[I,I]}", "dtype", dtype_name(a->type), "shape",
+	json_t *entry = json_pack("{s:s, s:o, s:[I,I]}", "dtype", file_dtype_name(a->type), "shape",
 	                          shape, "data_offsets", (json_int_t)*offset, (json_int_t)end);
 	*offset = end;
 	if (!entry || json_object_set_new(header, a->name, entry))
@@ -250,7 +250,7 @@ static char *header_text(const struct container_writer *w, size_t *bytes, struct
 
 	for (size_t size = 8; size; size /= 2)
 		for (size_t i = 0; i < w->arrays.n && !failed; i++)
-			if (dtype_size(array_at(w, i)->type) == size)
+			if (file_dtype_size(array_at(w, i)->type) == size)
 				failed = describe(w, header, array_at(w, i), &offset, e);
 	char *json = failed ? NULL : json_dumps(header, JSON_COMPACT);
 	json_decref(header);
@@ -260,8 +260,8 @@ static char *header_text(const struct container_writer *w, size_t *bytes, struct
 	if (text) {
 		memset(text, ' ', *bytes);
 		memcpy(text, json, length);
-		char *slot = container_header_slot(text, *bytes);
-		container_header_digest(text, *bytes, slot, hex);
+		char *slot = file_container_header_slot(text, *bytes);
+		file_container_header_digest(text, *bytes, slot, hex);
 		memcpy(slot, hex, CONTAINER_HEX);
 	}
 	free(json);
@@ -284,8 +284,8 @@ static int write_header(struct container_writer *w, struct err *e)
 	if (failed)
 		err_set(e, "%s: cannot write: the header has more than %d bytes", w->path,
 		        CONTAINER_HEADER_MAX);
-	failed = failed || atomic_file_write(w->file, &prefix, sizeof prefix, e) ||
-	         atomic_file_write(w->file, text, bytes, e);
+	failed = failed || file_atomic_write(w->file, &prefix, sizeof prefix, e) ||
+	         file_atomic_write(w->file, text, bytes, e);
 	free(text);
 	return failed ? -1 : 0;
 }
@@ -303,11 +303,11 @@ static int write_array(struct container_writer *w, struct array *a, char *block,
 		if (fread(block, 1, n, a->spool) != n)
 			return err_set(e, "%s: array %s: cannot read it back: %s", w->path,
 			               a->name, strerror(errno));
-		if (atomic_file_write(w->file, block, n, e))
+		if (file_atomic_write(w->file, block, n, e))
 			return -1;
 		left -= n;
 	}
-	if (atomic_file_write(w->file, a->buffer.data, a->buffer.n, e))
+	if (file_atomic_write(w->file, a->buffer.data, a->buffer.n, e))
 		return -1;
 	if (a->spool)
 		fclose(a->spool); /* gives its disk space back early */
@@ -323,24 +323,24 @@ static int write_all(struct container_writer *w, struct err *e)
 	for (size_t i = 0; i < w->arrays.n && !failed; i++)
 		failed = close_array(w, array_at(w, i), e);
 	failed = failed ||
-	         container_meta(w, CONTAINER_HEADER_DIGEST, CONTAINER_BLANK_DIGEST, e) ||
+	         file_container_meta(w, CONTAINER_HEADER_DIGEST, CONTAINER_BLANK_DIGEST, e) ||
 	         write_header(w, e) || !(block = mem_new(BUFFER, 1, w->path, e));
 	for (size_t size = 8; size; size /= 2)
 		for (size_t i = 0; i < w->arrays.n && !failed; i++)
-			if (dtype_size(array_at(w, i)->type) == size)
+			if (file_dtype_size(array_at(w, i)->type) == size)
 				failed = write_array(w, array_at(w, i), block, e);
 	free(block);
 	return failed ? -1 : 0;
 }
 
-int container_finish(struct container_writer *w, struct err *e)
+int file_container_finish(struct container_writer *w, struct err *e)
 {
 	int failed = write_all(w, e);
 
 	if (!failed) {
-		failed = atomic_file_finish(w->file, e);
+		failed = file_atomic_finish(w->file, e);
 		w->file = NULL;
 	}
-	container_abandon(w);
+	file_container_abandon(w);
 	return failed;
 }

@@ -7,7 +7,7 @@
 
 /* struct digest is never defined: it is xxHash's own state under our name. */
 
-struct digest *digest_new(void)
+struct digest *file_digest_new(void)
 {
 	XXH3_state_t *s = XXH3_createState();
 
@@ -16,21 +16,21 @@ struct digest *digest_new(void)
 	return (struct digest *)s;
 }
 
-void digest_bytes(struct digest *d, const void *data, size_t bytes)
+void file_digest_bytes(struct digest *d, const void *data, size_t bytes)
 {
 	if (d && bytes)
 		XXH3_128bits_update((XXH3_state_t *)d, data, bytes);
 }
 
-void digest_string(struct digest *d, const char *s)
+void file_digest_string(struct digest *d, const char *s)
 {
 	uint64_t n = strlen(s);
 
-	digest_bytes(d, &n, sizeof n);
-	digest_bytes(d, s, n);
+	file_digest_bytes(d, &n, sizeof n);
+	file_digest_bytes(d, s, n);
 }
 
-void digest_end(struct digest *d, char hex[33])
+void file_digest_end(struct digest *d, char hex[33])
 {
 	hex[0] = '\0';
 	if (!d)

@@ -7,10 +7,10 @@
 
 struct digest;
 
-struct digest *digest_new(void); /* NULL when out of memory */
-void digest_bytes(struct digest *d, const void *data, size_t bytes);
-void digest_string(struct digest *d, const char *s); /* with its length */
+struct digest *file_digest_new(void); /* NULL when out of memory */
+void file_digest_bytes(struct digest *d, const void *data, size_t bytes);
+void file_digest_string(struct digest *d, const char *s); /* with its length */
 /* Writes the digest and frees d. */
-void digest_end(struct digest *d, char hex[33]);
+void file_digest_end(struct digest *d, char hex[33]);
 
 #endif

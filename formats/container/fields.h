@@ -29,21 +29,21 @@ struct field_or_not {
 };
 
 /* Writes all arrays. 0, or -1 and e. */
-int fields_put(struct container_writer *w, const struct field *f, size_t n, struct err *e);
+int file_fields_put(struct container_writer *w, const struct field *f, size_t n, struct err *e);
 
 /* Sets the pointers to allocated copies, or into the mapped file. Every array must
  * be there with this type and shape. 0, or -1 and e; pointers already set stay. */
-int fields_copy(const struct container *c, const struct field *f, size_t n, struct err *e);
-int fields_map(const struct container *c, const struct field *f, size_t n, struct err *e);
+int file_fields_copy(const struct container *c, const struct field *f, size_t n, struct err *e);
+int file_fields_map(const struct container *c, const struct field *f, size_t n, struct err *e);
 
-/* As fields_map, but an array that may be absent and is gets made, and added to `made`
+/* As file_fields_map, but an array that may be absent and is gets made, and added to `made`
  * (void *, for the caller to free). 0, or -1 and e. */
-int fields_map_or_make(const struct container *c, const struct field_or_not *f, size_t n,
-                       struct vec *made, struct err *e);
+int file_fields_map_or_make(const struct container *c, const struct field_or_not *f, size_t n,
+                            struct vec *made, struct err *e);
 
 /* shape[dim] of an array, which must exist with this type and number of
  * dimensions. 0, or -1 and e. */
-int fields_size(const struct container *c, const char *name, enum dtype t, int dims, int dim,
-                size_t *size, struct err *e);
+int file_fields_size(const struct container *c, const char *name, enum dtype t, int dims, int dim,
+                     size_t *size, struct err *e);
 
 #endif

@@ -12,7 +12,7 @@ enum left_out { KEEP, DROP, DROP_WITH_NEXT };
 
 static int put(struct vec *line, const char *text, size_t n, struct err *e)
 {
-	return vec_append(line, text, n, 1, e);
+	return mem_append(line, text, n, 1, e);
 }
 
 /* "1/4" is a number of parts, not a path. */
@@ -159,7 +159,7 @@ static int put_command(struct vec *line, int argc, char *const argv[], struct er
 	return 0;
 }
 
-char *history_append(const char *before, int argc, char *const argv[], struct err *e)
+char *file_history_append(const char *before, int argc, char *const argv[], struct err *e)
 {
 	struct vec line = { 0 };
 	size_t n = before ? strlen(before) : 0;

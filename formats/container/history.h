@@ -8,6 +8,6 @@
  * shell-quoted, paths reduced to base names, without -j -q -v -o and their long
  * forms (--threads --quiet --verbose --output) and without an option's value
  * where it is one of these. To be freed; NULL and e when out of memory. */
-char *history_append(const char *before, int argc, char *const argv[], struct err *e);
+char *file_history_append(const char *before, int argc, char *const argv[], struct err *e);
 
 #endif

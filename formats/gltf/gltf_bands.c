@@ -104,7 +104,7 @@ static int all_grey(const struct palette *p)
 
 	for (size_t i = 0; i < p->n; i++)
 		for (int k = FRONT; k <= BACK; k++) {
-			const struct rules_side *s = &p->material[i].side[k];
+			const struct bsdf_side *s = &p->material[i].side[k];
 			if (!grey(s->rho_d, w) || !grey(s->tau_d, w) || !grey(s->rho_s, w) ||
 			    !grey(s->tau_s, w) || !grey(p->material[i].emission[k], w))
 				return 0;
@@ -141,7 +141,7 @@ static int choose_bands(const struct palette *p, int *bands, enum conversion *ho
 static void convert(const double *from, enum conversion how, int bands, double *to)
 {
 	for (int b = 0; b < bands; b++)
-		to[b] = how == SAME ? from[b] : how == REPLICATE ? from[0] : rules_luminance(from);
+		to[b] = how == SAME ? from[b] : how == REPLICATE ? from[0] : bsdf_luminance(from);
 }
 
 static void store(const struct palette *p, size_t i, enum conversion how)
@@ -153,8 +153,8 @@ static void store(const struct palette *p, size_t i, enum conversion how)
 	from->name = NULL;
 	mt->one_sided[i] = (uint8_t)from->one_sided;
 	for (int k = FRONT; k <= BACK; k++) {
-		const struct rules_side *s = &from->side[k];
-		size_t at = material_at(mt, i, k), plain = 2 * i + (size_t)k;
+		const struct bsdf_side *s = &from->side[k];
+		size_t at = model_material_at(mt, i, k), plain = 2 * i + (size_t)k;
 		convert(s->rho_d, how, mt->bands, mt->rho_d + at);
 		convert(s->tau_d, how, mt->bands, mt->tau_d + at);
 		convert(s->rho_s, how, mt->bands, mt->rho_s + at);
@@ -199,7 +199,7 @@ int gltf_materials(struct gltf_reader *g, struct model *m, struct err *e)
 
 	if (collect(&p) || choose_working_bands(&p) || read_all(&p) ||
 	    choose_bands(&p, &m->bands, &how) ||
-	    materials_new(&m->material, p.n, m->bands, e))
+	    model_materials_new(&m->material, p.n, m->bands, e))
 		goto out;
 	for (size_t i = 0; i < p.n; i++)
 		store(&p, i, how);

@@ -22,7 +22,7 @@ static int check_camera(const char *path, size_t i, const json_t *camera, struct
 		return err_set(e, "%s: cameras[%zu].%s: is missing; correct the file", path, i,
 		               type);
 	if (strcmp(type, "perspective") == 0) {
-		if (!camera_yfov_valid(gltf_number(o, "yfov", 0)))
+		if (!model_camera_yfov_valid(gltf_number(o, "yfov", 0)))
 			return err_set(e, "%s: cameras[%zu].perspective.yfov: %.15g is not between 0 "
 			               "and pi; correct the file", path, i, gltf_number(o, "yfov", 0));
 		if (!(near > 0))

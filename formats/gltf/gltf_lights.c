@@ -109,7 +109,7 @@ int gltf_lights(struct gltf_reader *g, struct model *m, const double *world,
 
 	for (size_t node = 0; node < g->doc.nodes; node++)
 		n += reached[node] && light_of(g, node) != GLTF_NONE;
-	int bad = lights_new(&m->light, n, RGB, e);
+	int bad = model_lights_new(&m->light, n, RGB, e);
 	for (size_t node = 0; !bad && node < g->doc.nodes; node++) {
 		int index = light_of(g, node);
 		if (!reached[node] || index == GLTF_NONE)

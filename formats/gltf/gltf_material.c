@@ -64,13 +64,13 @@ static double opacity(const struct reading *r)
 	return a >= gltf_number(r->material, "alphaCutoff", .5);
 }
 
-static int read_parameters(const struct reading *r, struct rules_gltf *p)
+static int read_parameters(const struct reading *r, struct bsdf_gltf *p)
 {
 	const json_t *pbr = json_object_get(r->material, "pbrMetallicRoughness");
 	const json_t *diffuse = extension(r, "KHR_materials_diffuse_transmission");
 	const json_t *specular = extension(r, "KHR_materials_specular");
 
-	*p = rules_gltf_default;
+	*p = bsdf_gltf_default;
 	colour(pbr, "baseColorFactor", p->base);
 	p->opacity = opacity(r);
 	p->metallic = gltf_number(pbr, "metallicFactor", p->metallic);
@@ -94,27 +94,27 @@ static int read_parameters(const struct reading *r, struct rules_gltf *p)
 	return 0;
 }
 
-static int note_fold(const struct reading *r, const char *lobe, enum rules_fate fate,
+static int note_fold(const struct reading *r, const char *lobe, enum bsdf_fate fate,
                      double share, double exponent)
 {
 	const struct gltf_options *o = r->g->options;
 	struct gltf_report *report = r->g->report;
 
 	switch (fate) {
-	case RULES_WIDE:
+	case BSDF_WIDE:
 		return gltf_note(report, r->e, "material %s: its %s lobe is folded into the diffuse "
 		                 "part: exponent %.3g is below %.3g", r->to->name, lobe, exponent,
 		                 o->min_exponent);
-	case RULES_WEAK:
+	case BSDF_WEAK:
 		return gltf_note(report, r->e, "material %s: its %s lobe is folded into the diffuse "
 		                 "part: its share of the albedo, %.3g, is below %.3g", r->to->name,
 		                 lobe, share, o->min_directional);
-	case RULES_PANE:
+	case BSDF_PANE:
 		return gltf_note(report, r->e, "material %s: its %s lobe is folded into the diffuse "
 		                 "part: alphaMode BLEND adds a clear pane, and a material has one "
 		                 "transmitted lobe", r->to->name, lobe);
-	case RULES_NONE:
-	case RULES_KEPT:
+	case BSDF_NONE:
+	case BSDF_KEPT:
 		break;
 	}
 	return 0;
@@ -136,13 +136,13 @@ static int spread(const struct reading *r, const double rgb[RGB], const char *wh
 static int read_factors(const struct reading *r)
 {
 	const struct gltf_options *o = r->g->options;
-	struct rules_gltf p;
-	struct rules_folding f;
-	struct rules_side rgb, *front = &r->to->side[FRONT];
+	struct bsdf_gltf p;
+	struct bsdf_folding f;
+	struct bsdf_side rgb, *front = &r->to->side[FRONT];
 
 	if (read_parameters(r, &p))
 		return -1;
-	rules_from_gltf(&p, o->min_directional, o->min_exponent, &rgb, &f);
+	bsdf_from_gltf(&p, o->min_directional, o->min_exponent, &rgb, &f);
 	if (note_fold(r, "reflected", f.reflected, f.reflected_share, f.exponent) ||
 	    note_fold(r, "transmitted", f.transmitted, f.transmitted_share, f.exponent) ||
 	    spread(r, rgb.rho_d, "diffuse reflection", front->rho_d) ||
@@ -259,7 +259,7 @@ static int take_exponent(const struct reading *r, const char *place, const json_
 
 static int take_side(const struct reading *r, const char *place, const json_t *o, int side)
 {
-	struct rules_side *s = &r->to->side[side];
+	struct bsdf_side *s = &r->to->side[side];
 	double *exponent = &r->to->emission_exponent[side];
 
 	if (take_bands(r, place, o, "rho_d", s->rho_d) ||
@@ -287,7 +287,7 @@ static int read_extras(const struct reading *r, json_t *o)
 	if (check_keys(r, at, o, all_keys) || check_keys(r, at_back, back, side_keys))
 		return -1;
 	for (int side = FRONT; side <= BACK; side++) {
-		r->to->side[side] = (struct rules_side){ .alpha = INFINITY, .beta = INFINITY };
+		r->to->side[side] = (struct bsdf_side){ .alpha = INFINITY, .beta = INFINITY };
 		if (take_side(r, at, o, side))
 			return -1;
 	}
@@ -334,18 +334,18 @@ static void set_sidedness(const struct reading *r, const json_t *extras)
 	struct gltf_material *to = r->to;
 
 	to->one_sided = !json_is_true(json_object_get(r->material, "doubleSided")) &&
-	                !rules_transmits(&to->side[FRONT], r->bands) &&
+	                !bsdf_side_transmits(&to->side[FRONT], r->bands) &&
 	                !json_object_get(extras, "back") &&
 	                !json_object_get(extras, "emission_back");
 	if (to->one_sided) {
-		to->side[BACK] = (struct rules_side){ .alpha = INFINITY, .beta = INFINITY };
+		to->side[BACK] = (struct bsdf_side){ .alpha = INFINITY, .beta = INFINITY };
 		memset(to->emission[BACK], 0, sizeof to->emission[BACK]);
 	}
 }
 
 static int check_albedo(const struct reading *r, int side, int band)
 {
-	double a = rules_albedo(&r->to->side[side], band);
+	double a = bsdf_side_albedo(&r->to->side[side], band);
 	const char *name = side == FRONT ? "front" : "back";
 
 	if (a <= 1 + MODEL_ALBEDO_SLACK)
@@ -354,7 +354,7 @@ static int check_albedo(const struct reading *r, int side, int band)
 		return err_set(r->e, "%s: material %s: %s side, band %d: rho_d + tau_d + rho_s + "
 		               "tau_s = %.9g exceeds 1; lower them", r->path, r->to->name, name,
 		               band, a);
-	rules_rescale(&r->to->side[side], band);
+	bsdf_side_rescale(&r->to->side[side], band);
 	return gltf_note(r->g->report, r->e, "material %s: %s side, band %d: albedo %.9g is "
 	                 "rescaled to 1", r->to->name, name, band, a);
 }
@@ -373,7 +373,7 @@ static int finish(const struct reading *r)
 		}
 		if (dark)
 			to->emission_exponent[side] = 1;
-		rules_normalise(&to->side[side], r->bands);
+		bsdf_side_normalise(&to->side[side], r->bands);
 	}
 	for (int b = 0; b < r->bands; b++)
 		reciprocal = reciprocal && to->side[FRONT].tau_d[b] == to->side[BACK].tau_d[b] &&

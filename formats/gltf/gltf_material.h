@@ -8,7 +8,7 @@
 
 struct gltf_material {
 	char *name;             /* set before reading */
-	struct rules_side side[2];
+	struct bsdf_side side[2];
 	double emission[2][BANDS_MAX];
 	double emission_exponent[2];
 	int one_sided;

@@ -128,7 +128,7 @@ static void set_matrix(struct instance *i, const double m[16])
 		i->normal_matrix[k] = -i->normal_matrix[k];
 }
 
-static int add_vertex(struct scene *s, const struct instance *i, size_t from, uint32_t *out)
+static int mesh_add_vertex(struct scene *s, const struct instance *i, size_t from, uint32_t *out)
 {
 	double x[3], w[3];
 
@@ -150,12 +150,12 @@ static int add_vertex(struct scene *s, const struct instance *i, size_t from, ui
 	*out = (uint32_t)s->vertex.n;
 	s->map[from] = *out;
 	s->stamp[from] = (uint32_t)s->surface + 1;
-	return vec_append(&s->vertex, w, 1, sizeof w, s->e);
+	return mem_append(&s->vertex, w, 1, sizeof w, s->e);
 }
 
 static void set_uv(const struct scene *s, const struct instance *i, size_t from, size_t to)
 {
-	float *uv = s->m->triangle_uv + 2 * to;
+	float *uv = s->m->triangle.uv + 2 * to;
 	double x[4];
 
 	if (i->p->uv == GLTF_NONE)
@@ -168,7 +168,7 @@ static void set_uv(const struct scene *s, const struct instance *i, size_t from,
 static void set_normal(const struct scene *s, const struct instance *i, size_t from,
                        size_t to)
 {
-	float *normal = s->m->triangle_normal + 3 * to;
+	float *normal = s->m->triangle.normal + 3 * to;
 	const double *c = i->normal_matrix;
 	double x[4], w[3];
 
@@ -187,12 +187,12 @@ static int add_triangle(struct scene *s, const struct instance *i, size_t t)
 {
 	size_t at = s->triangle++;
 
-	s->m->triangle_surface[at] = (uint32_t)s->surface;
+	s->m->triangle.surface[at] = (uint32_t)s->surface;
 	for (size_t k = 0; k < 3; k++) {
 		size_t from = corner(i->p->mode, t, i->flip && k ? 3 - k : k);
 		if (i->p->indices != GLTF_NONE)
 			from = gltf_index(&i->index, from);
-		if (add_vertex(s, i, from, &s->m->triangle[3 * at + k]))
+		if (mesh_add_vertex(s, i, from, &s->m->triangle.corner[3 * at + k]))
 			return -1;
 		set_uv(s, i, from, 3 * at + k);
 		set_normal(s, i, from, 3 * at + k);
@@ -290,15 +290,15 @@ static int allocate(struct scene *s, size_t surfaces, size_t triangles)
 		if (s->g->doc.accessor[i].count > most)
 			most = s->g->doc.accessor[i].count;
 	m->surface.n = surfaces;
-	m->triangles = triangles;
+	m->triangle.n = triangles;
 	m->surface.name = mem_new(surfaces, sizeof *m->surface.name, "names", s->e);
 	m->surface.material = mem_new(surfaces, sizeof *m->surface.material, "surfaces", s->e);
 	m->surface.has_normals = mem_new(surfaces, 1, "surfaces", s->e);
 	m->camera = mem_new(m->cameras, sizeof *m->camera, "cameras", s->e);
-	m->triangle = mem_new(triangles, 3 * sizeof *m->triangle, "triangles", s->e);
-	m->triangle_surface = mem_new(triangles, sizeof *m->triangle_surface, "triangles", s->e);
-	m->triangle_uv = mem_new(triangles, 6 * sizeof *m->triangle_uv, "UVs", s->e);
-	m->triangle_normal = mem_new(triangles, 9 * sizeof *m->triangle_normal, "normals", s->e);
+	m->triangle.corner = mem_new(triangles, 3 * sizeof *m->triangle.corner, "triangles", s->e);
+	m->triangle.surface = mem_new(triangles, sizeof *m->triangle.surface, "triangles", s->e);
+	m->triangle.uv = mem_new(triangles, 6 * sizeof *m->triangle.uv, "UVs", s->e);
+	m->triangle.normal = mem_new(triangles, 9 * sizeof *m->triangle.normal, "normals", s->e);
 	s->map = mem_new(most, sizeof *s->map, "vertices", s->e);
 	s->stamp = mem_new(most, sizeof *s->stamp, "vertices", s->e);
 	return s->e->set ? -1 : 0;
@@ -319,7 +319,7 @@ static int add_camera(struct scene *s, size_t node, struct camera *to)
 	to->aspect = from->aspect;
 	to->xmag = from->xmag;
 	to->ymag = from->ymag;
-	if (camera_pose(s->world + 16 * node, to->to_world))
+	if (model_camera_pose(s->world + 16 * node, to->to_world))
 		return err_set(s->e, "%s: nodes[%zu]: its matrix gives the camera no direction; "
 		               "correct it", s->g->source.path, node);
 	return 0;

@@ -19,11 +19,11 @@ static unsigned char *read_stream(FILE *f, const char *path, size_t known, size_
 	struct vec v = { 0 };
 	size_t got;
 
-	if (vec_reserve(&v, known + 1, 1, e))
+	if (mem_reserve(&v, known + 1, 1, e))
 		return NULL;
 	while ((got = fread((char *)v.data + v.n, 1, v.capacity - v.n, f)) > 0) {
 		v.n += got;
-		if (v.n == v.capacity && vec_reserve(&v, 65536, 1, e))
+		if (v.n == v.capacity && mem_reserve(&v, 65536, 1, e))
 			goto fail;
 	}
 	if (ferror(f)) {
@@ -309,15 +309,15 @@ int gltf_source_buffers(struct gltf_source *s, struct err *e)
 
 int gltf_source_digest(const struct gltf_source *s, char hex_digits[33], struct err *e)
 {
-	struct digest *d = digest_new();
+	struct digest *d = file_digest_new();
 
 	if (!d)
 		return err_set(e, "out of memory");
-	digest_bytes(d, s->file, s->bytes);
+	file_digest_bytes(d, s->file, s->bytes);
 	for (size_t i = 0; i < s->buffers; i++)
 		if (s->buffer[i].owned)
-			digest_bytes(d, s->buffer[i].data, s->buffer[i].bytes);
-	digest_end(d, hex_digits);
+			file_digest_bytes(d, s->buffer[i].data, s->buffer[i].bytes);
+	file_digest_end(d, hex_digits);
 	return 0;
 }
 

@@ -26,11 +26,11 @@ struct exr_file_info {
 #define EXR_FILE_KEY "twopassKey"  /* digest of inputs and options */
 
 /* Adds or replaces a string. 0, or -1 and e. O(strings). */
-int exr_file_info_set(struct exr_file_info *i, const char *name, const char *value,
+int file_exr_info_set(struct exr_file_info *i, const char *name, const char *value,
                       struct err *e);
 /* Its value, or NULL. */
-const char *exr_file_info_get(const struct exr_file_info *i, const char *name);
-void exr_file_info_free(struct exr_file_info *i);
+const char *file_exr_info_get(const struct exr_file_info *i, const char *name);
+void file_exr_info_free(struct exr_file_info *i);
 
 enum exr_file_compression {
 	EXR_FILE_AUTO, /* the default: zip, except for rows that it hardly makes smaller */
@@ -39,7 +39,7 @@ enum exr_file_compression {
 };
 
 /* The compression called auto, zip, zips, piz, rle or none; -1 when there is none such. */
-int exr_file_compression_by_name(const char *name);
+int file_exr_compression_by_name(const char *name);
 
 struct exr_file_options {
 	enum exr_file_compression compression;
@@ -51,22 +51,22 @@ struct exr_file_options {
 /* Writes a scanline file ("-" = stdout); its bytes depend on the arguments only.
  * options and info may be NULL; clipped (may be NULL) receives the number of
  * values that half clipped. 0, or -1 and e, with the old file whole. */
-int exr_file_write(const char *path, const struct image *im, const struct exr_file_info *info,
+int file_exr_write(const char *path, const struct image *im, const struct exr_file_info *info,
                    const struct exr_file_options *options, size_t *clipped, struct err *e);
 
 /* Reads a single-part scanline or tiled (level 0) file ("-" = stdin), all channels
  * as 32-bit floats over the data window. NaN and infinity pass. info may be NULL;
  * both are overwritten, and empty on failure. */
-int exr_file_read(const char *path, struct image *im, struct exr_file_info *info,
+int file_exr_read(const char *path, struct image *im, struct exr_file_info *info,
                   struct err *e);
 
 /* Reads the attributes alone; for scanline files it is also checked that the last
  * rows are there. Cost independent of the number of pixels but for a table of
  * 8 bytes per 16 rows. */
-int exr_file_read_info(const char *path, struct exr_file_info *info, struct err *e);
+int file_exr_read_info(const char *path, struct exr_file_info *info, struct err *e);
 
 /* 1 if `path` is a picture whose attribute EXR_FILE_KEY is `key`: then the file is
  * touched (mtime now). */
-int exr_file_up_to_date(const char *path, const char *key);
+int file_exr_up_to_date(const char *path, const char *key);
 
 #endif

@@ -27,14 +27,14 @@ static int append(struct exr_file_info *i, char *name, char *value, struct err *
 {
 	struct vec v = { i->string, i->strings, i->strings };
 	struct exr_file_string s = { name, value };
-	int status = vec_append(&v, &s, 1, sizeof s, e);
+	int status = mem_append(&v, &s, 1, sizeof s, e);
 
 	i->string = v.data;
 	i->strings = v.n;
 	return status;
 }
 
-int exr_file_info_set(struct exr_file_info *i, const char *name, const char *value,
+int file_exr_info_set(struct exr_file_info *i, const char *name, const char *value,
                       struct err *e)
 {
 	struct exr_file_string *old = find(i, name);
@@ -55,14 +55,14 @@ int exr_file_info_set(struct exr_file_info *i, const char *name, const char *val
 	return -1;
 }
 
-const char *exr_file_info_get(const struct exr_file_info *i, const char *name)
+const char *file_exr_info_get(const struct exr_file_info *i, const char *name)
 {
 	const struct exr_file_string *s = find(i, name);
 
 	return s ? s->value : NULL;
 }
 
-void exr_file_info_free(struct exr_file_info *i)
+void file_exr_info_free(struct exr_file_info *i)
 {
 	for (size_t k = 0; k < i->strings; k++) {
 		free(i->string[k].name);
@@ -72,17 +72,17 @@ void exr_file_info_free(struct exr_file_info *i)
 	*i = (struct exr_file_info){ 0 };
 }
 
-int exr_file_up_to_date(const char *path, const char *key)
+int file_exr_up_to_date(const char *path, const char *key)
 {
 	struct exr_file_info info = { 0 };
 	struct err ignored = { 0 };
 	struct stat st;
 
 	if (strcmp(path, "-") == 0 || stat(path, &st) || !S_ISREG(st.st_mode) ||
-	    exr_file_read_info(path, &info, &ignored))
+	    file_exr_read_info(path, &info, &ignored))
 		return 0;
-	const char *has = exr_file_info_get(&info, EXR_FILE_KEY);
+	const char *has = file_exr_info_get(&info, EXR_FILE_KEY);
 	int same = has && strcmp(has, key) == 0;
-	exr_file_info_free(&info);
+	file_exr_info_free(&info);
 	return same && utimensat(AT_FDCWD, path, NULL, 0) == 0;
 }

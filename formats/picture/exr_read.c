@@ -88,7 +88,7 @@ static int read_pipe(struct input *in)
 	ssize_t n;
 
 	do {
-		if (vec_reserve(&in->bytes, STEP, 1, in->e))
+		if (mem_reserve(&in->bytes, STEP, 1, in->e))
 			return -1;
 		n = read(in->fd, (char *)in->bytes.data + in->bytes.n, STEP);
 		if (n > 0)
@@ -213,7 +213,7 @@ static int read_attributes(struct input *in, struct exr_file_info *info)
 		/* "name" and "type" belong to the format. */
 		if (a->type == EXR_ATTR_STRING && a->string->str &&
 		    strcmp(a->name, "name") != 0 && strcmp(a->name, "type") != 0 &&
-		    exr_file_info_set(info, a->name, a->string->str, in->e))
+		    file_exr_info_set(info, a->name, a->string->str, in->e))
 			return -1;
 		if (a->type == EXR_ATTR_FLOAT && strcmp(a->name, "whiteLuminance") == 0)
 			info->white_luminance = a->f;
@@ -272,7 +272,7 @@ static int read_chunk(struct input *in, exr_decode_pipeline_t *pipe,
 		ch->user_bytes_per_element = sizeof(float);
 		ch->user_pixel_stride = sizeof(float);
 		ch->user_line_stride = (int32_t)((size_t)im->width * sizeof(float));
-		ch->decode_to_ptr = (uint8_t *)(image_plane(im, c) +
+		ch->decode_to_ptr = (uint8_t *)(picture_image_plane(im, c) +
 		                                (size_t)y * (size_t)im->width + (size_t)x);
 	}
 	if (first && check(in, exr_decoding_choose_default_routines(in->context, 0, pipe)))
@@ -322,7 +322,7 @@ static int new_image(struct input *in, struct image *im)
 		return -1;
 	for (int c = 0; c < n; c++)
 		name[c] = in->channels->entries[c].name.str;
-	status = image_new(im, in->width, in->height, n, name, in->e);
+	status = picture_image_new(im, in->width, in->height, n, name, in->e);
 	free(name);
 	return status;
 }
@@ -368,7 +368,7 @@ static int read_file(const char *path, struct image *im, struct exr_file_info *i
 	return status ? err_set(e, "%s", own.text) : 0;
 }
 
-int exr_file_read(const char *path, struct image *im, struct exr_file_info *info,
+int file_exr_read(const char *path, struct image *im, struct exr_file_info *info,
                   struct err *e)
 {
 	*im = (struct image){ 0 };
@@ -376,17 +376,17 @@ int exr_file_read(const char *path, struct image *im, struct exr_file_info *info
 		*info = (struct exr_file_info){ 0 };
 	if (read_file(path, im, info, e) == 0)
 		return 0;
-	image_free(im);
+	picture_image_free(im);
 	if (info)
-		exr_file_info_free(info);
+		file_exr_info_free(info);
 	return -1;
 }
 
-int exr_file_read_info(const char *path, struct exr_file_info *info, struct err *e)
+int file_exr_read_info(const char *path, struct exr_file_info *info, struct err *e)
 {
 	*info = (struct exr_file_info){ 0 };
 	if (read_file(path, NULL, info, e) == 0)
 		return 0;
-	exr_file_info_free(info);
+	file_exr_info_free(info);
 	return -1;
 }

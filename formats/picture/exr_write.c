@@ -39,7 +39,7 @@ static const struct {
 	[EXR_FILE_NONE] = { "none", EXR_COMPRESSION_NONE },
 };
 
-int exr_file_compression_by_name(const char *name)
+int file_exr_compression_by_name(const char *name)
 {
 	for (size_t i = 0; i < sizeof compressions / sizeof *compressions; i++)
 		if (strcmp(compressions[i].name, name) == 0)
@@ -69,7 +69,7 @@ static int64_t on_write(exr_const_context_t c, void *user, const void *data, uin
 		return report(c, EXR_ERR_WRITE_IO, "file too large"), -1;
 	end = (size_t)(offset + size);
 	if (end > o->bytes.n) {
-		if (vec_reserve(&o->bytes, end - o->bytes.n, 1, o->e))
+		if (mem_reserve(&o->bytes, end - o->bytes.n, 1, o->e))
 			return report(c, EXR_ERR_WRITE_IO, "out of memory"), -1;
 		memset((char *)o->bytes.data + o->bytes.n, 0, end - o->bytes.n);
 		o->bytes.n = end;
@@ -159,7 +159,7 @@ static void set_rows(struct output *o, exr_encode_pipeline_t *p)
 
 	for (int c = 0; c < p->channel_count; c++) {
 		exr_coding_channel_info_t *ch = &p->channels[c];
-		const float *rows = image_plane(im, image_channel(im, ch->channel_name)) +
+		const float *rows = picture_image_plane(im, picture_image_channel(im, ch->channel_name)) +
 		                    (size_t)p->chunk.start_y * (size_t)im->width;
 
 		if (ch->data_type == EXR_PIXEL_HALF)
@@ -235,13 +235,13 @@ static int check_image(const char *path, const struct image *im, struct err *e)
 		if (length < 1 || length > 255)
 			return err_set(e, "%s: channel '%.40s': a name has 1 to 255 bytes", path,
 			               im->name[c]);
-		if (image_channel(im, im->name[c]) != c)
+		if (picture_image_channel(im, im->name[c]) != c)
 			return err_set(e, "%s: channel '%s' is given twice", path, im->name[c]);
 	}
 	return 0;
 }
 
-int exr_file_write(const char *path, const struct image *im, const struct exr_file_info *info,
+int file_exr_write(const char *path, const struct image *im, const struct exr_file_info *info,
                    const struct exr_file_options *options, size_t *clipped, struct err *e)
 {
 	exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
@@ -267,7 +267,7 @@ int exr_file_write(const char *path, const struct image *im, const struct exr_fi
 	if (o.context && exr_finish(&o.context) != EXR_ERR_SUCCESS && status == 0)
 		status = err_set(&own, "%s: cannot write", path);
 	if (status == 0 && !own.set)
-		status = atomic_file_put(path, o.bytes.data, o.bytes.n, &own);
+		status = file_atomic_put(path, o.bytes.data, o.bytes.n, &own);
 	if (clipped)
 		*clipped = o.clipped;
 	free(o.rows);

@@ -8,8 +8,8 @@
  * (numpy.lib.format). */
 enum { PREFIX = 10, HEADER = 256 };
 
-int npy_begin(struct atomic_file *f, enum dtype t, int dims, const uint64_t *shape,
-              struct err *e)
+int file_npy_begin(struct atomic_file *f, enum dtype t, int dims, const uint64_t *shape,
+                   struct err *e)
 {
 	static const char *const descr[DT_COUNT] = {
 		[DT_F64] = "<f8", [DT_U64] = "<u8", [DT_I64] = "<i8", [DT_F32] = "<f4",
@@ -29,19 +29,19 @@ int npy_begin(struct atomic_file *f, enum dtype t, int dims, const uint64_t *sha
 	header[total - 1] = '\n';
 	header[8] = (char)((total - PREFIX) & 0xff);
 	header[9] = (char)((total - PREFIX) >> 8);
-	return atomic_file_write(f, header, total, e);
+	return file_atomic_write(f, header, total, e);
 }
 
-int npy_write(const char *path, const struct container_view *v, struct err *e)
+int file_npy_write(const char *path, const struct container_view *v, struct err *e)
 {
-	struct atomic_file *f = atomic_file_create(path, e);
+	struct atomic_file *f = file_atomic_create(path, e);
 
 	if (!f)
 		return -1;
-	if (npy_begin(f, v->type, v->dims, v->shape, e) ||
-	    atomic_file_write(f, v->data, v->count * dtype_size(v->type), e)) {
-		atomic_file_abandon(f);
+	if (file_npy_begin(f, v->type, v->dims, v->shape, e) ||
+	    file_atomic_write(f, v->data, v->count * file_dtype_size(v->type), e)) {
+		file_atomic_abandon(f);
 		return -1;
 	}
-	return atomic_file_finish(f, e);
+	return file_atomic_finish(f, e);
 }

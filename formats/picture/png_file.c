@@ -33,7 +33,7 @@ static void on_write(png_structp png, png_bytep data, size_t bytes)
 {
 	struct output *o = png_get_io_ptr(png);
 
-	if (vec_append(&o->bytes, data, bytes, 1, o->e))
+	if (mem_append(&o->bytes, data, bytes, 1, o->e))
 		png_error(png, "out of memory");
 }
 
@@ -78,7 +78,7 @@ static int encode(png_structp png, png_infop info, int width, int height, int bi
 	return 0;
 }
 
-int png_file_write(const char *path, int width, int height, int bits, const void *rgb,
+int file_png_write(const char *path, int width, int height, int bits, const void *rgb,
                    const char *comment, struct err *e)
 {
 	struct output o = { .path = path, .e = e };
@@ -94,7 +94,7 @@ int png_file_write(const char *path, int width, int height, int bits, const void
 	}
 	png_destroy_write_struct(&png, &info);
 	if (status == 0)
-		status = atomic_file_put(path, o.bytes.data, o.bytes.n, e);
+		status = file_atomic_put(path, o.bytes.data, o.bytes.n, e);
 	free(o.bytes.data);
 	return status;
 }

@@ -6,7 +6,7 @@
 
 #include "lib/base/mem.h"
 
-void patch_matrix_free(struct patch_matrix *pm)
+void ff_patch_matrix_free(struct patch_matrix *pm)
 {
 	free(pm->side);
 	free(pm->row);
@@ -41,22 +41,22 @@ static void choose_rows(struct patch_matrix *pm, const uint32_t *column)
 {
 	const struct ff *f = pm->f;
 
-	for (uint32_t r = 0; r < f->rows; r++) {
-		if (f->row_kind[r] > FF_EMISSION)
+	for (uint32_t r = 0; r < f->row.n; r++) {
+		if (f->row.kind[r] > FF_EMISSION)
 			continue;
-		uint32_t at = column[f->row_side[r]];
+		uint32_t at = column[f->row.side[r]];
 		if (at == FF_NO_ROW)
 			continue;
-		if (f->row_kind[r] == FF_DIFFUSE || pm->row[at] == FF_NO_ROW)
+		if (f->row.kind[r] == FF_DIFFUSE || pm->row[at] == FF_NO_ROW)
 			pm->row[at] = r;
 	}
 	for (size_t i = 0; i < pm->sides; i++)
-		if (pm->row[i] != FF_NO_ROW && f->block_black[f->row_block[pm->row[i]]] > 0)
+		if (pm->row[i] != FF_NO_ROW && f->block.black[f->row.block[pm->row[i]]] > 0)
 			pm->unmodelled = 1;
 }
 
-int patch_matrix_init(struct patch_matrix *pm, const struct ff *f, const struct ff_scene *s,
-                      struct err *e)
+int ff_patch_matrix_init(struct patch_matrix *pm, const struct ff *f, const struct ff_scene *s,
+                         struct err *e)
 {
 	uint32_t *column = mem_new(2 * s->patches, sizeof *column, "patch-sides", e);
 
@@ -72,12 +72,12 @@ int patch_matrix_init(struct patch_matrix *pm, const struct ff *f, const struct 
 	}
 	free(column);
 	if (failed)
-		patch_matrix_free(pm);
+		ff_patch_matrix_free(pm);
 	return failed ? -1 : 0;
 }
 
-void patch_matrix_row(const struct patch_matrix *pm, size_t i, double *out,
-                      double *unmodelled, double *escape)
+void ff_patch_matrix_row(const struct patch_matrix *pm, size_t i, double *out,
+                         double *unmodelled, double *escape)
 {
 	const struct ff *f = pm->f;
 	const uint32_t r = pm->row[i];
@@ -87,9 +87,9 @@ void patch_matrix_row(const struct patch_matrix *pm, size_t i, double *out,
 		out[k] = r == FF_NO_ROW ? (double)NAN : 0;
 	if (r == FF_NO_ROW)
 		return;
-	const uint64_t b = f->row_block[r];
-	*unmodelled = f->block_black[b];
-	*escape = f->block_escape[b] + f->block_lost[b] + f->block_cut[b];
+	const uint64_t b = f->row.block[r];
+	*unmodelled = f->block.black[b];
+	*escape = f->block.escape[b] + f->block.lost[b] + f->block.cut[b];
 	struct ff_span s;
 	for (struct ff_cursor c = ff_begin(f, b); ff_next(&c, &s);)
 		for (uint32_t k = 0; k < s.count; k++) {
@@ -98,7 +98,7 @@ void patch_matrix_row(const struct patch_matrix *pm, size_t i, double *out,
 			*to += ff_value(f, s.entry + k);
 		}
 	for (size_t k = 0; k < pm->sides; k++)
-		out[k] *= f->row_scale[r];
-	*unmodelled *= f->row_scale[r];
-	*escape *= f->row_scale[r];
+		out[k] *= f->row.scale[r];
+	*unmodelled *= f->row.scale[r];
+	*escape *= f->row.scale[r];
 }

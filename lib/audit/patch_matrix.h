@@ -17,14 +17,14 @@ struct patch_matrix {
 };
 
 /* f and s must have passed ff_check. 0, or -1 and e. O(rows + elements + patches). */
-int patch_matrix_init(struct patch_matrix *pm, const struct ff *f, const struct ff_scene *s,
-                      struct err *e);
-void patch_matrix_free(struct patch_matrix *pm);
+int ff_patch_matrix_init(struct patch_matrix *pm, const struct ff *f, const struct ff_scene *s,
+                         struct err *e);
+void ff_patch_matrix_free(struct patch_matrix *pm);
 
 /* What leaves side[i], by where it first lands: out[sides], then the fractions that
  * meet black backs and that leave the scene. They sum to 1. NaN throughout if there
  * is no row. O(sides + entries of the row). */
-void patch_matrix_row(const struct patch_matrix *pm, size_t i, double *out,
-                      double *unmodelled, double *escape);
+void ff_patch_matrix_row(const struct patch_matrix *pm, size_t i, double *out,
+                         double *unmodelled, double *escape);
 
 #endif

@@ -2,20 +2,20 @@
 
 #include "lib/scatter/bsdf.h"
 
-void side_row(const struct model *m, const struct solution *s, size_t element_side,
-              struct side_row *out)
+void solution_side_row(const struct model *m, const struct solution *s, size_t element_side,
+                       struct side_row *out)
 {
 	const size_t i = element_side >> 1;
-	const uint32_t *corner = &m->element[3 * i];
+	const uint32_t *corner = &m->element.corner[3 * i];
 
-	*out = (struct side_row){ .element = (uint32_t)i, .patch = m->element_patch[i],
-	                          .side = (int)(element_side & 1), .area = m->element_area[i] };
-	out->surface = m->patch_surface[out->patch];
+	*out = (struct side_row){ .element = (uint32_t)i, .patch = m->element.patch[i],
+	                          .side = (int)(element_side & 1), .area = m->element.area[i] };
+	out->surface = m->patch.surface[out->patch];
 	out->material = m->surface.material[out->surface];
 	for (int k = 0; k < 3; k++) {
 		for (int c = 0; c < 3; c++)
 			out->centre[k] += m->vertex[3 * (size_t)corner[c] + (size_t)k] / 3;
-		out->normal[k] = m->element_normal[3 * i + (size_t)k];
+		out->normal[k] = m->element.normal[3 * i + (size_t)k];
 		if (out->side == BACK)
 			out->normal[k] = 0 - out->normal[k]; /* never -0 */
 	}

@@ -13,7 +13,7 @@ struct side_row {
 };
 
 /* Fills out for an element-side; h and m only with a solution (else NULL). */
-void side_row(const struct model *m, const struct solution *s, size_t element_side,
-              struct side_row *out);
+void solution_side_row(const struct model *m, const struct solution *s, size_t element_side,
+                       struct side_row *out);
 
 #endif

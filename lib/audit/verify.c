@@ -36,8 +36,8 @@ static int sum_entry(struct pairs *p, uint64_t first, uint32_t at, double value,
 		((double *)p->value.data)[p->value.n - 1] += value;
 		return 0;
 	}
-	return vec_append(&p->column, &at, 1, sizeof at, e) ||
-	       vec_append(&p->value, &value, 1, sizeof value, e) ? -1 : 0;
+	return mem_append(&p->column, &at, 1, sizeof at, e) ||
+	       mem_append(&p->value, &value, 1, sizeof value, e) ? -1 : 0;
 }
 
 static int sum_row(struct pairs *p, uint32_t r, struct err *e)
@@ -46,10 +46,10 @@ static int sum_row(struct pairs *p, uint32_t r, struct err *e)
 	const uint64_t first = p->column.n;
 	struct ff_span s;
 
-	for (struct ff_cursor c = ff_begin(f, f->row_block[r]); ff_next(&c, &s);)
+	for (struct ff_cursor c = ff_begin(f, f->row.block[r]); ff_next(&c, &s);)
 		for (uint32_t k = 0; k < s.count; k++)
 			if (sum_entry(p, first, p->pm.place[s.column + 2 * k],
-			              f->row_scale[r] * ff_value(f, s.entry + k), e))
+			              f->row.scale[r] * ff_value(f, s.entry + k), e))
 				return -1;
 	return 0;
 }
@@ -58,12 +58,12 @@ static int pairs_init(struct pairs *p, const struct ff *f, const struct ff_scene
                       struct err *e)
 {
 	*p = (struct pairs){ .scene = s };
-	if (patch_matrix_init(&p->pm, f, s, e) ||
+	if (ff_patch_matrix_init(&p->pm, f, s, e) ||
 	    !(p->start = mem_new(p->pm.sides + 1, sizeof *p->start, "patch pairs", e)))
 		return -1;
 	for (size_t i = 0; i < p->pm.sides; i++) {
 		uint32_t r = p->pm.row[i];
-		if (r != FF_NO_ROW && f->row_kind[r] != FF_DIFFUSE)
+		if (r != FF_NO_ROW && f->row.kind[r] != FF_DIFFUSE)
 			p->pm.row[i] = r = FF_NO_ROW; /* lobes are not reciprocal */
 		if (r != FF_NO_ROW && sum_row(p, r, e))
 			return -1;
@@ -74,7 +74,7 @@ static int pairs_init(struct pairs *p, const struct ff *f, const struct ff_scene
 
 static void pairs_free(struct pairs *p)
 {
-	patch_matrix_free(&p->pm);
+	ff_patch_matrix_free(&p->pm);
 	free(p->start);
 	free(p->column.data);
 	free(p->value.data);
@@ -106,7 +106,7 @@ static double area(const struct pairs *p, size_t i)
  * what float32 values leave. */
 static double variance(const struct pairs *p, size_t i, double flow)
 {
-	double error = area(p, i) * (double)p->pm.f->row_error[p->pm.row[i]], rounding = 1e-6 * flow;
+	double error = area(p, i) * (double)p->pm.f->row.error[p->pm.row[i]], rounding = 1e-6 * flow;
 
 	return error * error + rounding * rounding;
 }
@@ -174,19 +174,19 @@ static double worst_closure(const struct ff *f, double *residual)
 	double worst = 0;
 
 	*residual = 0;
-	for (size_t r = 0; r < f->rows; r++) {
-		uint64_t b = f->row_block[r];
-		double sum = f->block_escape[b] + f->block_black[b] + f->block_lost[b] +
-		             f->block_cut[b];
-		for (uint64_t k = f->block_start[b]; k < f->block_start[b + 1]; k++)
+	for (size_t r = 0; r < f->row.n; r++) {
+		uint64_t b = f->row.block[r];
+		double sum = f->block.escape[b] + f->block.black[b] + f->block.lost[b] +
+		             f->block.cut[b];
+		for (uint64_t k = f->block.start[b]; k < f->block.start[b + 1]; k++)
 			sum += ff_value(f, k);
-		worst = fmax(worst, fabs(1 - f->row_scale[r] * sum));
-		*residual = fmax(*residual, fabs((double)f->row_residual[r]));
+		worst = fmax(worst, fabs(1 - f->row.scale[r] * sum));
+		*residual = fmax(*residual, fabs((double)f->row.residual[r]));
 	}
 	return worst;
 }
 
-int verify_ff(const struct ff *f, const struct ff_scene *s, struct verify *v, struct err *e)
+int ff_verify(const struct ff *f, const struct ff_scene *s, struct verify *v, struct err *e)
 {
 	struct pairs p;
 	struct reciprocity r = { 0 };
@@ -218,9 +218,9 @@ static double unshot(const struct solution *s, size_t band, int magnitude)
 	const struct {
 		const double *flux;
 		size_t n, channels;
-	} list[] = { { s->unshot_emission, s->sources, bands },
-	             { s->unshot_diffuse, s->patch_sides, channels },
-	             { s->unshot_link, 2 * s->links, channels } };
+	} list[] = { { s->unshot.emission, s->sources, bands },
+	             { s->unshot.diffuse, s->patch_sides, channels },
+	             { s->unshot.link, 2 * s->links, channels } };
 	double sum = 0;
 
 	for (size_t k = 0; k < sizeof list / sizeof *list; k++)
@@ -248,22 +248,22 @@ static double absorbed(const struct model *m, const struct solution *s, int band
 	double sum = 0;
 
 	for (size_t i = 0; i < s->element_sides; i++) {
-		uint32_t material = model_patch_material(m, m->element_patch[i >> 1]);
+		uint32_t material = model_patch_material(m, m->element.patch[i >> 1]);
 		double a = bsdf_albedo(&m->material, material, (int)(i & 1), band);
-		sum += m->element_area[i >> 1] * (1 - a) * solution_irradiance(s, i, band);
+		sum += m->element.area[i >> 1] * (1 - a) * solution_irradiance(s, i, band);
 	}
 	return sum;
 }
 
 static int all_two_sided(const struct model *m)
 {
-	for (size_t p = 0; p < m->patches; p++)
+	for (size_t p = 0; p < m->patch.n; p++)
 		if (m->material.one_sided[model_patch_material(m, (uint32_t)p)])
 			return 0;
 	return 1;
 }
 
-void verify_solution(const struct model *m, const struct solution *s, struct verify *v)
+void solution_verify(const struct model *m, const struct solution *s, struct verify *v)
 {
 	const size_t bands = (size_t)s->bands;
 	double residual = 0, missing = 0, left = 0;

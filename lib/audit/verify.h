@@ -22,10 +22,10 @@ struct verify {
 /* Closure of the rows, and reciprocity A_i F_ij = A_j F_ji between all patch-sides
  * whose diffuse rows are there, against the errors the rows state. 0, or -1 and e.
  * O(entries log row). */
-int verify_ff(const struct ff *f, const struct ff_scene *s, struct verify *v, struct err *e);
+int ff_verify(const struct ff *f, const struct ff_scene *s, struct verify *v, struct err *e);
 
 /* The ledger, and the flux absorbed by elements against it. O(element sides x bands). */
-void verify_solution(const struct model *m, const struct solution *s, struct verify *v);
+void solution_verify(const struct model *m, const struct solution *s, struct verify *v);
 
 static inline int verify_good(const struct verify_item *i)
 {

@@ -2,8 +2,8 @@
 
 #include <inttypes.h>
 
-int check_below(const char *name, const uint32_t *index, size_t n, size_t limit,
-                struct err *e)
+int err_check_below(const char *name, const uint32_t *index, size_t n, size_t limit,
+                    struct err *e)
 {
 	for (size_t i = 0; i < n; i++)
 		if (index[i] >= limit)
@@ -12,8 +12,8 @@ int check_below(const char *name, const uint32_t *index, size_t n, size_t limit,
 	return 0;
 }
 
-int check_starts(const char *name, const uint64_t *start, size_t n, uint64_t end,
-                 uint64_t least, struct err *e)
+int err_check_starts(const char *name, const uint64_t *start, size_t n, uint64_t end,
+                     uint64_t least, struct err *e)
 {
 	if (start[0] != 0 || start[n] != end)
 		return err_set(e, "array %s: it runs from %" PRIu64 " to %" PRIu64

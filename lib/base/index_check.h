@@ -9,11 +9,11 @@
 #include "lib/base/err.h"
 
 /* All n indices are below limit. */
-int check_below(const char *name, const uint32_t *index, size_t n, size_t limit,
-                struct err *e);
+int err_check_below(const char *name, const uint32_t *index, size_t n, size_t limit,
+                    struct err *e);
 
 /* start[0] = 0, steps of at least `least`, start[n] = end. */
-int check_starts(const char *name, const uint64_t *start, size_t n, uint64_t end,
-                 uint64_t least, struct err *e);
+int err_check_starts(const char *name, const uint64_t *start, size_t n, uint64_t end,
+                     uint64_t least, struct err *e);
 
 #endif

@@ -42,7 +42,7 @@ void *mem_new(size_t n, size_t size, const char *what, struct err *e)
 	return p;
 }
 
-int vec_reserve(struct vec *v, size_t more, size_t size, struct err *e)
+int mem_reserve(struct vec *v, size_t more, size_t size, struct err *e)
 {
 	if (more <= v->capacity - v->n)
 		return 0;
@@ -59,9 +59,9 @@ int vec_reserve(struct vec *v, size_t more, size_t size, struct err *e)
 	return 0;
 }
 
-int vec_append(struct vec *v, const void *src, size_t n, size_t size, struct err *e)
+int mem_append(struct vec *v, const void *src, size_t n, size_t size, struct err *e)
 {
-	if (vec_reserve(v, n, size, e))
+	if (mem_reserve(v, n, size, e))
 		return -1;
 	if (n)
 		memcpy((char *)v->data + v->n * size, src, n * size);

@@ -23,9 +23,9 @@ struct vec {
 };
 
 /* Makes room for `more` further elements of `size` bytes. 0, or -1 and e. */
-int vec_reserve(struct vec *v, size_t more, size_t size, struct err *e);
+int mem_reserve(struct vec *v, size_t more, size_t size, struct err *e);
 
 /* Appends n elements copied from src. 0, or -1 and e. */
-int vec_append(struct vec *v, const void *src, size_t n, size_t size, struct err *e);
+int mem_append(struct vec *v, const void *src, size_t n, size_t size, struct err *e);
 
 #endif

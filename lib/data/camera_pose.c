@@ -7,7 +7,7 @@
 
 static const double PI = 3.14159265358979323846;
 
-int camera_pose(const double affine[16], double to_world[16])
+int model_camera_pose(const double affine[16], double to_world[16])
 {
 	double right[3], up[3], back[3];
 
@@ -28,7 +28,7 @@ int camera_pose(const double affine[16], double to_world[16])
 	return 0;
 }
 
-int camera_yfov_valid(double yfov)
+int model_camera_yfov_valid(double yfov)
 {
 	return yfov > 0 && yfov < PI;
 }

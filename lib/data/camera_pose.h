@@ -5,9 +5,9 @@
 /* The rigid part of an affine column-major matrix: keeps the position, the viewing
  * direction -Z and the half-plane of +Y, drops scale, shear and mirroring. -1 when
  * Y and Z are not independent. */
-int camera_pose(const double affine[16], double to_world[16]);
+int model_camera_pose(const double affine[16], double to_world[16]);
 
 /* 1 if a perspective camera can have this vertical field of view: 0 < yfov < pi. */
-int camera_yfov_valid(double yfov);
+int model_camera_yfov_valid(double yfov);
 
 #endif

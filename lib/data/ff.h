@@ -44,35 +44,62 @@ enum ff_row_kind {
 	FF_ROW_KINDS
 };
 
-struct ff {
-	/* Chains. Event id = ((2 material + side light arrives on) 2 + T), T = 1
-	 * straight through. Chain c passed events chain_event[i] chain_count[i]
-	 * times (or more, where that is the most that chain.h counts), i in
-	 * [chain_start[c], chain_start[c+1]), ascending. */
-	size_t chains, chain_events;
-	uint64_t *chain_start;
-	uint32_t *chain_event, *chain_count;
-	uint32_t chain_most;      /* where counts of ideal events of a colour stop */
+/* Chains of directional events. Event id = ((2 material + side light arrives on) 2 + T),
+ * T = 1 straight through. Chain c passed events event[i] count[i] times (or more, where
+ * that is the most that is counted), i in [start[c], start[c+1]), ascending. */
+struct ff_chains {
+	size_t n, events;
+	uint64_t *start;          /* [n+1] */
+	uint32_t *event, *count;  /* [events] */
+	uint32_t most;            /* where counts of ideal events of a colour stop */
+};
 
-	size_t rows;
-	uint32_t *row_side;       /* patch-side, or light, that the flux leaves */
-	uint8_t *row_kind;
-	uint32_t *row_samples;    /* rays or hemicube pixels spent on block 0, or as many
+struct ff_rows {
+	size_t n;
+	uint32_t *side;           /* [n] patch-side, or light, that the flux leaves */
+	uint8_t *kind;            /* [n] enum ff_row_kind */
+	uint32_t *samples;        /* [n] rays or hemicube pixels spent on block 0, or as many
 	                             independent rays as gathered values are worth to the
-	                             irradiance of elements;
-	                             0: all by formula */
-	double *row_scale;
-	float *row_residual;      /* 1 - sum before scaling (raw closure error) */
-	float *row_error;         /* over receiving patch-sides: the root of the summed squares of
-	                             standard errors; of a row all by formula the sum of the
-	                             estimated errors */
-	uint64_t *row_block;      /* [rows+1] first block */
+	                             irradiance of elements; 0: all by formula */
+	double *scale;            /* [n] */
+	float *residual;          /* [n] 1 - sum before scaling (raw closure error) */
+	float *error;             /* [n] over receiving patch-sides: the root of the summed
+	                             squares of standard errors; of a row all by formula the
+	                             sum of the estimated errors */
+	uint64_t *block;          /* [n+1] first block */
+};
 
-	size_t blocks;
-	uint32_t *block_chain;    /* chain 0 first, then ascending length */
-	uint64_t *block_start;    /* [blocks+1] first entry */
-	double *block_escape, *block_black, *block_lost, *block_cut;
-	uint64_t *block_arrival;  /* [blocks+1] first arrival */
+struct ff_blocks {
+	size_t n;
+	uint32_t *chain;          /* [n] chain 0 first, then ascending length */
+	uint64_t *start;          /* [n+1] first entry */
+	double *escape, *black, *lost, *cut; /* [n] */
+	uint64_t *arrival;        /* [n+1] first arrival */
+	uint64_t *column;         /* [n] twice the first word of its columns, + 1 where spans
+	                             begin there; NULL: all lists, one after the other */
+};
+
+/* Mean direction of light of a block arriving at a patch-side with a lobe. */
+struct ff_arrivals {
+	size_t n;
+	uint32_t *target;         /* [n] patch-side */
+	float *direction;         /* [n][3] unit vector towards where it comes from */
+};
+
+struct ff_links {
+	size_t n;
+	uint32_t *target;         /* [n] ascending; then by chain, source */
+	uint32_t *source;         /* [n] first patch-side, or a light, or FF_ANY */
+	uint32_t *last;           /* [n] last patch-side (the same for light), or FF_ANY */
+	uint32_t *chain;          /* [n] */
+	float *direction;         /* [n][3] mean direction to the source */
+	uint32_t *row;            /* [n][2] rows about R and T, or FF_NO_ROW */
+};
+
+struct ff {
+	struct ff_chains chain;
+	struct ff_rows row;
+	struct ff_blocks block;
 
 	/* The columns of a block are a list, a word for each entry, or spans: pairs of
 	 * words (first column, count) that stand for the columns first, first + 2, ...,
@@ -80,31 +107,18 @@ struct ff {
 	 * patch-side, then element. Read them by ff_next. */
 	size_t entries, columns;
 	int to_patches;           /* 0: a column is an element-side, 1: a patch-side */
-	uint64_t *block_column;   /* [blocks] twice the first word, + 1 where spans begin
-	                             there; NULL: all lists, one after the other */
 	uint32_t *column;         /* [columns] words; one of column, column16 is NULL */
 	uint16_t *column16;
-	float *value;             /* one of value, value64 is NULL */
+	float *value;             /* [entries]; one of value, value64 is NULL */
 	double *value64;
 
-	/* Mean direction of light of a block arriving at a patch-side with a lobe:
-	 * unit vector towards where it comes from. */
-	size_t arrivals;
-	uint32_t *arrival_target;
-	float *arrival_direction; /* [arrivals][3] */
-
-	size_t links;
-	uint32_t *link_target;    /* ascending; then by chain, source */
-	uint32_t *link_source;    /* first patch-side, or a light, or FF_ANY */
-	uint32_t *link_last;      /* last patch-side (the same for light), or FF_ANY */
-	uint32_t *link_chain;
-	float *link_direction;    /* [links][3] mean direction to the source */
-	uint32_t *link_row;       /* [links][2] rows about R and T, or FF_NO_ROW */
+	struct ff_arrivals arrival;
+	struct ff_links link;
 
 	/* The shard: patches [patch_begin, patch_end), and as large a part of the lights,
 	 * leave through these rows. */
 	uint32_t patch_begin, patch_end;
-	uint32_t part, parts;     /* K/N, 1-based */
+	uint32_t shard, shards;   /* K/N, 1-based */
 };
 
 void ff_free(struct ff *f);
@@ -121,12 +135,12 @@ static inline uint32_t ff_word(const struct ff *f, uint64_t i)
 
 static inline uint64_t ff_first_word(const struct ff *f, uint64_t block)
 {
-	return f->block_column ? f->block_column[block] >> 1 : f->block_start[block];
+	return f->block.column ? f->block.column[block] >> 1 : f->block.start[block];
 }
 
 static inline int ff_has_spans(const struct ff *f, uint64_t block)
 {
-	return f->block_column && (f->block_column[block] & 1);
+	return f->block.column && (f->block.column[block] & 1);
 }
 
 /* Neighbouring entries: columns column, column + 2, ... with values from `entry` on. */
@@ -147,8 +161,8 @@ struct ff_cursor {
 
 static inline struct ff_cursor ff_begin(const struct ff *f, uint64_t block)
 {
-	return (struct ff_cursor){ f, ff_first_word(f, block), f->block_start[block],
-	                           f->block_start[block + 1], ff_has_spans(f, block) };
+	return (struct ff_cursor){ f, ff_first_word(f, block), f->block.start[block],
+	                           f->block.start[block + 1], ff_has_spans(f, block) };
 }
 
 static inline int ff_next(struct ff_cursor *c, struct ff_span *s)

@@ -63,20 +63,20 @@ static int check_scene(const struct ff_scene *s, struct err *e)
 
 static int check_chains(const struct ff *f, size_t materials, struct err *e)
 {
-	if (f->chains == 0)
+	if (f->chain.n == 0)
 		return err_set(e, "array chain_start: there is no chain 0");
-	if (f->chain_most == 0)
+	if (f->chain.most == 0)
 		return err_set(e, "array chain_most: it is 0");
-	if (check_starts("chain_start", f->chain_start, f->chains, f->chain_events, 0, e) ||
-	    check_below("chain_event", f->chain_event, f->chain_events, 4 * materials, e))
+	if (err_check_starts("chain_start", f->chain.start, f->chain.n, f->chain.events, 0, e) ||
+	    err_check_below("chain_event", f->chain.event, f->chain.events, 4 * materials, e))
 		return -1;
-	if (f->chain_start[1] != 0)
+	if (f->chain.start[1] != 0)
 		return err_set(e, "array chain_start: chain 0 is not empty");
-	for (size_t c = 0; c < f->chains; c++)
-		for (uint64_t i = f->chain_start[c]; i < f->chain_start[c + 1]; i++) {
-			if (f->chain_count[i] == 0)
+	for (size_t c = 0; c < f->chain.n; c++)
+		for (uint64_t i = f->chain.start[c]; i < f->chain.start[c + 1]; i++) {
+			if (f->chain.count[i] == 0)
 				return err_set(e, "array chain_count: value %" PRIu64 " is 0", i);
-			if (i > f->chain_start[c] && f->chain_event[i] <= f->chain_event[i - 1])
+			if (i > f->chain.start[c] && f->chain.event[i] <= f->chain.event[i - 1])
 				return err_set(e, "array chain_event: values %" PRIu64 " and %" PRIu64
 				               " do not ascend", i - 1, i);
 		}
@@ -87,8 +87,8 @@ static uint64_t chain_length(const struct ff *f, uint32_t chain)
 {
 	uint64_t n = 0;
 
-	for (uint64_t i = f->chain_start[chain]; i < f->chain_start[chain + 1]; i++)
-		n += f->chain_count[i];
+	for (uint64_t i = f->chain.start[chain]; i < f->chain.start[chain + 1]; i++)
+		n += f->chain.count[i];
 	return n;
 }
 
@@ -101,33 +101,33 @@ static size_t sources(const struct ff_scene *s)
 
 static int check_row(const struct ff *f, const struct ff_scene *s, size_t r, struct err *e)
 {
-	uint32_t source = f->row_side[r], patch = source >> 1;
+	uint32_t source = f->row.side[r], patch = source >> 1;
 
-	if (f->row_kind[r] >= FF_ROW_KINDS)
-		return err_set(e, "array row_kind: value %zu is %d", r, f->row_kind[r]);
-	if (f->row_kind[r] == FF_LIGHT && (patch < s->patches || source >= sources(s)))
+	if (f->row.kind[r] >= FF_ROW_KINDS)
+		return err_set(e, "array row_kind: value %zu is %d", r, f->row.kind[r]);
+	if (f->row.kind[r] == FF_LIGHT && (patch < s->patches || source >= sources(s)))
 		return err_set(e, "array row_side: row %zu leaves source %" PRIu32 ", which is no "
 		               "light", r, source);
-	if (f->row_kind[r] != FF_LIGHT && (patch < f->patch_begin || patch >= f->patch_end))
+	if (f->row.kind[r] != FF_LIGHT && (patch < f->patch_begin || patch >= f->patch_end))
 		return err_set(e, "array row_side: row %zu leaves patch %" PRIu32 ", which is not "
 		               "in this part", r, patch);
-	if (!(f->row_scale[r] > 0 && isfinite(f->row_scale[r])))
-		return err_set(e, "array row_scale: value %zu is %g", r, f->row_scale[r]);
-	if (!isfinite(f->row_residual[r]))
+	if (!(f->row.scale[r] > 0 && isfinite(f->row.scale[r])))
+		return err_set(e, "array row_scale: value %zu is %g", r, f->row.scale[r]);
+	if (!isfinite(f->row.residual[r]))
 		return err_set(e, "array row_residual: value %zu is %g", r,
-		               (double)f->row_residual[r]);
+		               (double)f->row.residual[r]);
 	return 0;
 }
 
 /* Chain 0 first, then ascending length. */
 static int check_row_chains(const struct ff *f, size_t r, struct err *e)
 {
-	uint64_t begin = f->row_block[r], length = 0;
+	uint64_t begin = f->row.block[r], length = 0;
 
-	if (f->block_chain[begin] != 0)
+	if (f->block.chain[begin] != 0)
 		return err_set(e, "array block_chain: row %zu does not begin with chain 0", r);
-	for (uint64_t b = begin + 1; b < f->row_block[r + 1]; b++) {
-		uint64_t n = chain_length(f, f->block_chain[b]);
+	for (uint64_t b = begin + 1; b < f->row.block[r + 1]; b++) {
+		uint64_t n = chain_length(f, f->block.chain[b]);
 		if (n == 0 || n < length)
 			return err_set(e, "array block_chain: block %" PRIu64 " is out of order", b);
 		length = n;
@@ -137,17 +137,17 @@ static int check_row_chains(const struct ff *f, size_t r, struct err *e)
 
 static int check_rows(const struct ff *f, const struct ff_scene *s, struct err *e)
 {
-	if (check_starts("row_block", f->row_block, f->rows, f->blocks, 1, e) ||
-	    check_starts("block_start", f->block_start, f->blocks, f->entries, 0, e) ||
-	    check_starts("block_arrival", f->block_arrival, f->blocks, f->arrivals, 0, e) ||
-	    check_below("block_chain", f->block_chain, f->blocks, f->chains, e) ||
-	    not_negative_f32("row_error", f->row_error, f->rows, e) ||
-	    not_negative("block_escape", f->block_escape, f->blocks, e) ||
-	    not_negative("block_black", f->block_black, f->blocks, e) ||
-	    not_negative("block_lost", f->block_lost, f->blocks, e) ||
-	    not_negative("block_cut", f->block_cut, f->blocks, e))
+	if (err_check_starts("row_block", f->row.block, f->row.n, f->block.n, 1, e) ||
+	    err_check_starts("block_start", f->block.start, f->block.n, f->entries, 0, e) ||
+	    err_check_starts("block_arrival", f->block.arrival, f->block.n, f->arrival.n, 0, e) ||
+	    err_check_below("block_chain", f->block.chain, f->block.n, f->chain.n, e) ||
+	    not_negative_f32("row_error", f->row.error, f->row.n, e) ||
+	    not_negative("block_escape", f->block.escape, f->block.n, e) ||
+	    not_negative("block_black", f->block.black, f->block.n, e) ||
+	    not_negative("block_lost", f->block.lost, f->block.n, e) ||
+	    not_negative("block_cut", f->block.cut, f->block.n, e))
 		return -1;
-	for (size_t r = 0; r < f->rows; r++)
+	for (size_t r = 0; r < f->row.n; r++)
 		if (check_row(f, s, r, e) || check_row_chains(f, r, e))
 			return -1;
 	return 0;
@@ -194,7 +194,7 @@ static int check_span(const struct columns *c, uint64_t word, uint32_t first, ui
 
 static uint64_t words(const struct ff *f)
 {
-	return f->block_column ? f->columns : f->entries;
+	return f->block.column ? f->columns : f->entries;
 }
 
 /* `left` values from word w on. */
@@ -236,7 +236,7 @@ static int check_list(const struct columns *c, uint64_t b, uint64_t w, uint64_t 
 static int check_columns(const struct columns *c, uint64_t b, struct err *e)
 {
 	const struct ff *f = c->f;
-	uint64_t first = ff_first_word(f, b), n = f->block_start[b + 1] - f->block_start[b];
+	uint64_t first = ff_first_word(f, b), n = f->block.start[b + 1] - f->block.start[b];
 
 	if (first > words(f))
 		return err_set(e, "array block_column: block %" PRIu64 " begins beyond the last column",
@@ -250,14 +250,14 @@ static int check_values(const struct ff *f, uint64_t b, double *sum, struct err 
 	double least = 0;
 
 	*sum = 0;
-	for (uint64_t i = f->block_start[b]; i < f->block_start[b + 1]; i++) {
+	for (uint64_t i = f->block.start[b]; i < f->block.start[b + 1]; i++) {
 		double v = ff_value(f, i);
 		*sum += v;
 		least = v < least ? v : least;
 	}
 	if (least >= 0 && isfinite(*sum))
 		return 0;
-	for (uint64_t i = f->block_start[b]; i < f->block_start[b + 1]; i++)
+	for (uint64_t i = f->block.start[b]; i < f->block.start[b + 1]; i++)
 		if (!(ff_value(f, i) >= 0 && isfinite(ff_value(f, i))))
 			return err_set(e, "array value: value %" PRIu64 " is %g", i, ff_value(f, i));
 	return err_set(e, "array value: block %" PRIu64 " sums to %g", b, *sum);
@@ -268,14 +268,14 @@ static int check_row_entries(const struct columns *c, size_t r, struct err *e)
 	const struct ff *f = c->f;
 	double whole = 0, sum;
 
-	for (uint64_t b = f->row_block[r]; b < f->row_block[r + 1]; b++) {
+	for (uint64_t b = f->row.block[r]; b < f->row.block[r + 1]; b++) {
 		if (check_columns(c, b, e) || check_values(f, b, &sum, e))
 			return -1;
-		if (b == f->row_block[r])
-			whole = sum + f->block_escape[b] + f->block_black[b] + f->block_lost[b] +
-			        f->block_cut[b];
+		if (b == f->row.block[r])
+			whole = sum + f->block.escape[b] + f->block.black[b] + f->block.lost[b] +
+			        f->block.cut[b];
 	}
-	whole *= f->row_scale[r];
+	whole *= f->row.scale[r];
 	if (!(fabs(whole - 1) <= closure_slack))
 		return err_set(e, "array value: row %zu sums to %.12g instead of 1", r, whole);
 	return 0;
@@ -290,7 +290,7 @@ static int check_entries(const struct ff *f, const struct ff_scene *s, struct er
 	for (size_t p = 0; c.patch_of && p < s->patches; p++)
 		for (uint32_t i = s->patch_start[p]; i < s->patch_start[p + 1]; i++)
 			c.patch_of[i] = (uint32_t)p;
-	for (size_t r = 0; r < f->rows && !failed; r++)
+	for (size_t r = 0; r < f->row.n && !failed; r++)
 		failed = check_row_entries(&c, r, e);
 	free(c.patch_of);
 	return failed ? -1 : 0;
@@ -300,16 +300,16 @@ static int check_entries(const struct ff *f, const struct ff_scene *s, struct er
 
 static int check_link_row(const struct ff *f, size_t l, int transmitted, struct err *e)
 {
-	uint32_t row = f->link_row[2 * l + (size_t)transmitted], target = f->link_target[l];
+	uint32_t row = f->link.row[2 * l + (size_t)transmitted], target = f->link.target[l];
 
 	if (row == FF_NO_ROW)
 		return 0;
-	if (row >= f->rows)
+	if (row >= f->row.n)
 		return err_set(e, "array link_row: link %zu has row %" PRIu32 " of %zu", l, row,
-		               f->rows);
+		               f->row.n);
 	/* Light through a sheet leaves its other side. */
-	if (f->row_kind[row] != (transmitted ? FF_TRANSMITTED : FF_REFLECTED) ||
-	    f->row_side[row] != (transmitted ? target ^ 1 : target))
+	if (f->row.kind[row] != (transmitted ? FF_TRANSMITTED : FF_REFLECTED) ||
+	    f->row.side[row] != (transmitted ? target ^ 1 : target))
 		return err_set(e, "array link_row: link %zu has row %" PRIu32 ", which is not one "
 		               "of its target", l, row);
 	return 0;
@@ -319,28 +319,28 @@ static int check_link_row(const struct ff *f, size_t l, int transmitted, struct 
  * direction bins may repeat. */
 static int link_order(const struct ff *f, size_t l)
 {
-	const uint32_t *key[] = { f->link_target, f->link_chain, f->link_source };
+	const uint32_t *key[] = { f->link.target, f->link.chain, f->link.source };
 
 	for (size_t k = 0; k < sizeof key / sizeof *key; k++)
 		if (key[k][l] != key[k][l - 1])
-			return key[k][l] > (k == 2 ? f->link_last : key[k])[l - 1];
-	return f->link_source[l] == FF_ANY;
+			return key[k][l] > (k == 2 ? f->link.last : key[k])[l - 1];
+	return f->link.source[l] == FF_ANY;
 }
 
 static int check_links(const struct ff *f, const struct ff_scene *s, struct err *e)
 {
-	if (check_below("link_target", f->link_target, f->links, 2 * s->patches, e) ||
-	    check_below("link_chain", f->link_chain, f->links, f->chains, e) ||
-	    unit_vectors("link_direction", f->link_direction, f->links, e))
+	if (err_check_below("link_target", f->link.target, f->link.n, 2 * s->patches, e) ||
+	    err_check_below("link_chain", f->link.chain, f->link.n, f->chain.n, e) ||
+	    unit_vectors("link_direction", f->link.direction, f->link.n, e))
 		return -1;
-	for (size_t l = 0; l < f->links; l++) {
-		if (f->link_source[l] != FF_ANY && f->link_source[l] >= sources(s))
+	for (size_t l = 0; l < f->link.n; l++) {
+		if (f->link.source[l] != FF_ANY && f->link.source[l] >= sources(s))
 			return err_set(e, "array link_source: value %zu is %" PRIu32, l,
-			               f->link_source[l]);
-		if (f->link_last[l] < f->link_source[l] ||
-		    (f->link_source[l] != FF_ANY && f->link_last[l] >= sources(s)))
+			               f->link.source[l]);
+		if (f->link.last[l] < f->link.source[l] ||
+		    (f->link.source[l] != FF_ANY && f->link.last[l] >= sources(s)))
 			return err_set(e, "array link_last: value %zu is %" PRIu32, l,
-			               f->link_last[l]);
+			               f->link.last[l]);
 		if (l && !link_order(f, l))
 			return err_set(e, "array link_target: link %zu is out of order", l);
 		if (check_link_row(f, l, 0, e) || check_link_row(f, l, 1, e))
@@ -354,8 +354,8 @@ static int check_part(const struct ff *f, size_t patches, struct err *e)
 	if (f->patch_begin > f->patch_end || f->patch_end > patches)
 		return err_set(e, "array part: patches %" PRIu32 " to %" PRIu32 " of %zu",
 		               f->patch_begin, f->patch_end, patches);
-	if (f->part < 1 || f->part > f->parts)
-		return err_set(e, "array part: part %" PRIu32 " of %" PRIu32, f->part, f->parts);
+	if (f->shard < 1 || f->shard > f->shards)
+		return err_set(e, "array part: part %" PRIu32 " of %" PRIu32, f->shard, f->shards);
 	return 0;
 }
 
@@ -364,7 +364,7 @@ int ff_check(const struct ff *f, const struct ff_scene *s, struct err *e)
 	return check_scene(s, e) || check_part(f, s->patches, e) ||
 	       check_chains(f, s->materials, e) || check_rows(f, s, e) ||
 	       check_entries(f, s, e) ||
-	       check_below("arrival_target", f->arrival_target, f->arrivals, 2 * s->patches, e) ||
-	       unit_vectors("arrival_direction", f->arrival_direction, f->arrivals, e) ||
+	       err_check_below("arrival_target", f->arrival.target, f->arrival.n, 2 * s->patches, e) ||
+	       unit_vectors("arrival_direction", f->arrival.direction, f->arrival.n, e) ||
 	       check_links(f, s, e) ? -1 : 0;
 }

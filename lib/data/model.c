@@ -10,7 +10,7 @@
 
 uint32_t model_locate(const struct model *m, uint32_t tri, double w[3])
 {
-	int32_t at = m->triangle_split[tri];
+	int32_t at = m->triangle.split[tri];
 
 	while (at >= 0) {
 		const struct split *s = &m->split[at];
@@ -30,27 +30,27 @@ uint32_t model_locate(const struct model *m, uint32_t tri, double w[3])
 
 int model_derive(struct model *m, struct err *e)
 {
-	m->element_area = mem_new(m->elements, sizeof *m->element_area, "element areas", e);
-	m->element_normal = mem_new(m->elements, 3 * sizeof *m->element_normal,
+	m->element.area = mem_new(m->element.n, sizeof *m->element.area, "element areas", e);
+	m->element.normal = mem_new(m->element.n, 3 * sizeof *m->element.normal,
 	                            "element normals", e);
-	m->element_patch = mem_new(m->elements, sizeof *m->element_patch, "element patches", e);
-	m->patch_area = mem_new(m->patches, sizeof *m->patch_area, "patch areas", e);
-	if (!m->element_area || !m->element_normal || !m->element_patch || !m->patch_area)
+	m->element.patch = mem_new(m->element.n, sizeof *m->element.patch, "element patches", e);
+	m->patch.area = mem_new(m->patch.n, sizeof *m->patch.area, "patch areas", e);
+	if (!m->element.area || !m->element.normal || !m->element.patch || !m->patch.area)
 		return -1;
-	for (size_t p = 0; p < m->patches; p++)
-		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++) {
-			const uint32_t *c = &m->element[3 * (size_t)i];
-			double *n = &m->element_normal[3 * (size_t)i];
+	for (size_t p = 0; p < m->patch.n; p++)
+		for (uint32_t i = m->patch.start[p]; i < m->patch.start[p + 1]; i++) {
+			const uint32_t *c = &m->element.corner[3 * (size_t)i];
+			double *n = &m->element.normal[3 * (size_t)i];
 			v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
 			        &m->vertex[3 * (size_t)c[2]], n);
-			m->element_area[i] = v3_normalise(n);
-			m->element_patch[i] = (uint32_t)p;
-			m->patch_area[p] += m->element_area[i];
+			m->element.area[i] = v3_normalise(n);
+			m->element.patch[i] = (uint32_t)p;
+			m->patch.area[p] += m->element.area[i];
 		}
-	return lights_derive(m, e);
+	return model_lights_derive(m, e);
 }
 
-int materials_new(struct materials *mt, size_t n, int bands, struct err *e)
+int model_materials_new(struct materials *mt, size_t n, int bands, struct err *e)
 {
 	size_t nb = 2 * n * (size_t)bands;
 	double **banded[] = { &mt->rho_d, &mt->tau_d, &mt->rho_s, &mt->tau_s, &mt->emission };
@@ -78,7 +78,7 @@ static void free_names(char **name, size_t n)
 	free(name);
 }
 
-void materials_free(struct materials *mt)
+void model_materials_free(struct materials *mt)
 {
 	free_names(mt->name, mt->n);
 	free(mt->rho_d);
@@ -93,7 +93,7 @@ void materials_free(struct materials *mt)
 	*mt = (struct materials){ 0 };
 }
 
-int lights_new(struct lights *l, size_t n, int bands, struct err *e)
+int model_lights_new(struct lights *l, size_t n, int bands, struct err *e)
 {
 	*l = (struct lights){ .n = n };
 	l->name = mem_new(n, sizeof *l->name, "light names", e);
@@ -106,7 +106,7 @@ int lights_new(struct lights *l, size_t n, int bands, struct err *e)
 	           ? 0 : -1;
 }
 
-void lights_free(struct lights *l)
+void model_lights_free(struct lights *l)
 {
 	free_names(l->name, l->n);
 	free(l->kind);
@@ -121,19 +121,19 @@ void lights_free(struct lights *l)
 
 void model_free(struct model *m)
 {
-	materials_free(&m->material);
-	lights_free(&m->light);
+	model_materials_free(&m->material);
+	model_lights_free(&m->light);
 	free_names(m->surface.name, m->surface.n);
 	free(m->surface.material);
 	free(m->surface.has_normals);
 	for (size_t i = 0; m->camera && i < m->cameras; i++)
 		free(m->camera[i].name);
 	free(m->camera);
-	void *array[] = { m->vertex, m->triangle, m->triangle_surface, m->triangle_uv,
-		m->triangle_normal, m->triangle_split, m->split, m->element,
-		m->element_triangle, m->element_area, m->element_normal, m->element_patch,
-		m->patch_start, m->patch_surface, m->patch_area, m->patch_loop,
-		m->loop_start, m->loop_index };
+	void *array[] = { m->vertex, m->triangle.corner, m->triangle.surface, m->triangle.uv,
+		m->triangle.normal, m->triangle.split, m->split, m->element.corner,
+		m->element.triangle, m->element.area, m->element.normal, m->element.patch,
+		m->patch.start, m->patch.surface, m->patch.area, m->patch.loop,
+		m->patch.loop_start, m->patch.loop_index };
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
 	*m = (struct model){ 0 };
@@ -143,9 +143,9 @@ void model_box(const struct model *m, double lo[3], double hi[3])
 {
 	for (int k = 0; k < 3; k++)
 		lo[k] = INFINITY, hi[k] = -INFINITY;
-	for (size_t i = 0; i < 3 * m->triangles; i++)
+	for (size_t i = 0; i < 3 * m->triangle.n; i++)
 		for (size_t k = 0; k < 3; k++) {
-			double x = m->vertex[3 * (size_t)m->triangle[i] + k];
+			double x = m->vertex[3 * (size_t)m->triangle.corner[i] + k];
 			lo[k] = fmin(lo[k], x);
 			hi[k] = fmax(hi[k], x);
 		}

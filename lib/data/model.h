@@ -50,9 +50,10 @@ struct lights {
 	                             its intensity is full, beyond the outer 0; else 0 */
 	double *intensity;        /* [n][bands] cd along the axis; lx, of a plane across
 	                             the light, for directional ones */
-	double *unit_flux;        /* derived, [n] flux of intensity 1 */
-	double *cosine;           /* derived, [n][2] of the cones */
-	double box[2][3];         /* derived: the least and largest coordinates of triangles */
+	/* Derived: */
+	double *unit_flux;        /* [n] flux of intensity 1 */
+	double *cosine;           /* [n][2] of the cones */
+	double box[2][3];         /* the least and largest coordinates of triangles */
 };
 
 struct camera {
@@ -74,6 +75,44 @@ struct split {
 	int32_t edge;
 };
 
+/* Input triangles, cleaned and cut where others touch. */
+struct triangles {
+	size_t n;
+	uint32_t *corner;         /* [n][3] vertices, counter-clockwise seen from the front */
+	uint32_t *surface;        /* [n] */
+	float *uv;                /* [n][3][2] TEXCOORD_0, 0 if none */
+	float *normal;            /* [n][3][3] shading normals, 0 if none */
+	int32_t *split;           /* [n] root: >= 0 a split, else ~element */
+};
+
+/* Elements receive light: parts of input triangles. */
+struct elements {
+	size_t n;
+	uint32_t *corner;         /* [n][3] vertices, winding kept */
+	uint32_t *triangle;       /* [n] the input triangle */
+	/* Derived: */
+	double *area;             /* [n] m^2 */
+	double *normal;           /* [n][3] unit front normals */
+	uint32_t *patch;          /* [n] */
+};
+
+/* Patches shoot light: connected elements of one surface, contiguous in `elements`. */
+struct patches {
+	size_t n;
+	uint32_t *start;          /* [n+1] first element */
+	uint32_t *surface;        /* [n] */
+	/* Outline loops of planar patches (empty for curved ones), the outer loop
+	 * first, wound like the elements. */
+	uint64_t *loop;           /* [n+1] first loop */
+	size_t loops;
+	uint64_t *loop_start;     /* [loops+1] first index */
+	size_t loop_indices;
+	uint32_t *loop_index;     /* [loop_indices] vertices */
+	/* Derived: */
+	double *area;             /* [n] m^2 */
+};
+
+/* What is under "Derived" here is in no file: model_derive makes it from the rest. */
 struct model {
 	int bands;
 	enum lobe_kind lobe;
@@ -86,41 +125,17 @@ struct model {
 	size_t vertices;
 	double *vertex;           /* [vertices][3] world, metres */
 
-	size_t triangles;         /* input triangles, cleaned and cut where others touch */
-	uint32_t *triangle;       /* [triangles][3] vertices, counter-clockwise
-	                             seen from the front */
-	uint32_t *triangle_surface;
-	float *triangle_uv;       /* [triangles][3][2] TEXCOORD_0, 0 if none */
-	float *triangle_normal;   /* [triangles][3][3] shading normals, 0 if none */
-	int32_t *triangle_split;  /* root: >= 0 a split, else ~element */
+	struct triangles triangle;
 	size_t splits;
 	struct split *split;
-
-	size_t elements;
-	uint32_t *element;        /* [elements][3] vertices, winding kept */
-	uint32_t *element_triangle;
-	double *element_area;     /* derived, m^2 */
-	double *element_normal;   /* derived, [elements][3] unit front normals */
-	uint32_t *element_patch;  /* derived */
-
-	size_t patches;
-	uint32_t *patch_start;    /* [patches+1] first element: elements of a patch
-	                             are contiguous */
-	uint32_t *patch_surface;
-	double *patch_area;       /* derived */
-	/* Outline loops of planar patches (empty for curved ones), the outer loop
-	 * first, wound like the elements. */
-	uint64_t *patch_loop;     /* [patches+1] first loop */
-	size_t loops;
-	uint64_t *loop_start;     /* [loops+1] first index */
-	size_t loop_indices;
-	uint32_t *loop_index;     /* vertices */
+	struct elements element;
+	struct patches patch;
 };
 
 /* Material of an element or patch. */
 static inline uint32_t model_patch_material(const struct model *m, uint32_t patch)
 {
-	return m->surface.material[m->patch_surface[patch]];
+	return m->surface.material[m->patch.surface[patch]];
 }
 
 /* The element of input triangle `tri` that holds the point with barycentric
@@ -141,14 +156,14 @@ static inline int model_side_modelled(const struct model *m, uint32_t patch_side
 
 /* Allocates all arrays of n materials with `bands` bands (zero coefficients,
  * exponents infinite, emission exponents 1). 0, or -1 and e. */
-int materials_new(struct materials *mt, size_t n, int bands, struct err *e);
+int model_materials_new(struct materials *mt, size_t n, int bands, struct err *e);
 
 /* Allocates all arrays of n lights with `bands` bands but the derived ones, zeroed.
  * 0, or -1 and e. */
-int lights_new(struct lights *l, size_t n, int bands, struct err *e);
+int model_lights_new(struct lights *l, size_t n, int bands, struct err *e);
 
 /* Index into rho_d and its like. */
-static inline size_t material_at(const struct materials *mt, size_t m, int side)
+static inline size_t model_material_at(const struct materials *mt, size_t m, int side)
 {
 	return (2 * m + (size_t)side) * (size_t)mt->bands;
 }
@@ -156,14 +171,14 @@ static inline size_t material_at(const struct materials *mt, size_t m, int side)
 /* A source of light is a patch-side, or, numbered behind these, a punctual light. */
 static inline uint32_t model_sources(const struct model *m)
 {
-	return (uint32_t)(2 * m->patches + m->light.n);
+	return (uint32_t)(2 * m->patch.n + m->light.n);
 }
 
 /* The box of all vertices that triangles use. */
 void model_box(const struct model *m, double lo[3], double hi[3]);
 
-void materials_free(struct materials *mt);
-void lights_free(struct lights *l);
+void model_materials_free(struct materials *mt);
+void model_lights_free(struct lights *l);
 void model_free(struct model *m);
 
 #endif

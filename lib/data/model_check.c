@@ -55,7 +55,7 @@ static int check_side(const struct materials *mt, size_t m, size_t side, struct 
 		const double *value;
 	} coefficient[] = { { "rho_d", mt->rho_d }, { "tau_d", mt->tau_d },
 	                    { "rho_s", mt->rho_s }, { "tau_s", mt->tau_s } };
-	const size_t at = material_at(mt, m, (int)side);
+	const size_t at = model_material_at(mt, m, (int)side);
 
 	for (int b = 0; b < mt->bands; b++) {
 		double sum = 0, l = mt->emission[at + (size_t)b];
@@ -104,7 +104,7 @@ static int check_one_sided(const struct materials *mt, size_t m, struct err *e)
 		return err_set(e, "array material_one_sided: material '%.100s': %d is not 0 or 1",
 		               mt->name[m], mt->one_sided[m]);
 	for (int b = 0; mt->one_sided[m] && b < mt->bands; b++) {
-		size_t at = material_at(mt, m, FRONT) + (size_t)b;
+		size_t at = model_material_at(mt, m, FRONT) + (size_t)b;
 		if (mt->tau_d[at] > 0 || mt->tau_s[at] > 0)
 			return err_set(e, "array material_one_sided: material '%.100s' is one-sided "
 			               "but transmits light", mt->name[m]);
@@ -237,27 +237,27 @@ static int check_surfaces(const struct model *m, struct err *e)
 	for (size_t i = 0; i < s->n; i++)
 		if (s->has_normals[i] > 1)
 			return err_set(e, "array surface_has_normals: value %zu is not 0 or 1", i);
-	return check_below("surface_material", s->material, s->n, m->material.n, e) ||
+	return err_check_below("surface_material", s->material, s->n, m->material.n, e) ||
 	       unique_names("surfaces", s->name, s->n, e) ? -1 : 0;
 }
 
 static int check_vertices_and_triangles(const struct model *m, struct err *e)
 {
 	return finite_f64("vertex", m->vertex, 3 * m->vertices, e) ||
-	       check_below("triangle", m->triangle, 3 * m->triangles, m->vertices, e) ||
-	       check_below("triangle_surface", m->triangle_surface, m->triangles,
+	       err_check_below("triangle", m->triangle.corner, 3 * m->triangle.n, m->vertices, e) ||
+	       err_check_below("triangle_surface", m->triangle.surface, m->triangle.n,
 	                m->surface.n, e) ||
-	       finite_f32("triangle_uv", m->triangle_uv, 6 * m->triangles, e) ||
-	       finite_f32("triangle_normal", m->triangle_normal, 9 * m->triangles, e) ? -1 : 0;
+	       finite_f32("triangle_uv", m->triangle.uv, 6 * m->triangle.n, e) ||
+	       finite_f32("triangle_normal", m->triangle.normal, 9 * m->triangle.n, e) ? -1 : 0;
 }
 
 static int check_elements(const struct model *m, struct err *e)
 {
-	if (check_below("element", m->element, 3 * m->elements, m->vertices, e) ||
-	    check_below("element_triangle", m->element_triangle, m->elements, m->triangles, e))
+	if (err_check_below("element", m->element.corner, 3 * m->element.n, m->vertices, e) ||
+	    err_check_below("element_triangle", m->element.triangle, m->element.n, m->triangle.n, e))
 		return -1;
-	for (size_t i = 0; i < m->elements; i++) {
-		const uint32_t *c = &m->element[3 * i];
+	for (size_t i = 0; i < m->element.n; i++) {
+		const uint32_t *c = &m->element.corner[3 * i];
 		double n[3];
 		v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
 		        &m->vertex[3 * (size_t)c[2]], n);
@@ -284,25 +284,25 @@ static int reach(struct walk *w, int32_t at, size_t t, struct err *e)
 	size_t i = at >= 0 ? (size_t)at : (size_t)~at;
 	uint8_t *seen = at >= 0 ? w->split_seen : w->element_seen;
 
-	if (i >= (at >= 0 ? m->splits : m->elements))
+	if (i >= (at >= 0 ? m->splits : m->element.n))
 		return err_set(e, "array triangle_split or split: the tree of triangle %zu leads "
 		               "to %s %zu of %zu", t, at >= 0 ? "split" : "element", i,
-		               at >= 0 ? m->splits : m->elements);
+		               at >= 0 ? m->splits : m->element.n);
 	if (seen[i])
 		return err_set(e, "array triangle_split or split: %s %zu is reached twice",
 		               at >= 0 ? "split" : "element", i);
 	seen[i] = 1;
 	if (at >= 0)
 		w->stack[w->depth++] = at;
-	else if (m->element_triangle[i] != t)
+	else if (m->element.triangle[i] != t)
 		return err_set(e, "array element_triangle: the tree of triangle %zu leads to "
-		               "element %zu of triangle %" PRIu32, t, i, m->element_triangle[i]);
+		               "element %zu of triangle %" PRIu32, t, i, m->element.triangle[i]);
 	return 0;
 }
 
 static int walk_tree(struct walk *w, size_t t, struct err *e)
 {
-	if (reach(w, w->m->triangle_split[t], t, e))
+	if (reach(w, w->m->triangle.split[t], t, e))
 		return -1;
 	while (w->depth) {
 		int32_t at = w->stack[--w->depth];
@@ -322,12 +322,12 @@ static int check_splits(const struct model *m, struct err *e)
 	int failed;
 
 	w.split_seen = mem_new(m->splits, 1, "split trees", e);
-	w.element_seen = mem_new(m->elements, 1, "split trees", e);
+	w.element_seen = mem_new(m->element.n, 1, "split trees", e);
 	w.stack = mem_new(m->splits, sizeof *w.stack, "split trees", e);
 	failed = !w.split_seen || !w.element_seen || !w.stack;
-	for (size_t t = 0; t < m->triangles && !failed; t++)
+	for (size_t t = 0; t < m->triangle.n && !failed; t++)
 		failed = walk_tree(&w, t, e);
-	for (size_t i = 0; i < m->elements && !failed; i++)
+	for (size_t i = 0; i < m->element.n && !failed; i++)
 		if (!w.element_seen[i])
 			failed = err_set(e, "array split: no tree leads to element %zu", i);
 	for (size_t i = 0; i < m->splits && !failed; i++)
@@ -343,20 +343,20 @@ static int check_splits(const struct model *m, struct err *e)
 
 static int check_patches(const struct model *m, struct err *e)
 {
-	const uint32_t *start = m->patch_start;
+	const uint32_t *start = m->patch.start;
 
-	if (check_below("patch_surface", m->patch_surface, m->patches, m->surface.n, e))
+	if (err_check_below("patch_surface", m->patch.surface, m->patch.n, m->surface.n, e))
 		return -1;
-	if (start[0] != 0 || start[m->patches] != m->elements)
+	if (start[0] != 0 || start[m->patch.n] != m->element.n)
 		return err_set(e, "array patch_start: it runs from %" PRIu32 " to %" PRIu32
-		               " and should from 0 to %zu", start[0], start[m->patches],
-		               m->elements);
-	for (size_t p = 0; p < m->patches; p++)
-		if (start[p + 1] <= start[p] || start[p + 1] > m->elements)
+		               " and should from 0 to %zu", start[0], start[m->patch.n],
+		               m->element.n);
+	for (size_t p = 0; p < m->patch.n; p++)
+		if (start[p + 1] <= start[p] || start[p + 1] > m->element.n)
 			return err_set(e, "array patch_start: patch %zu has no elements", p);
-	for (size_t p = 0; p < m->patches; p++)
+	for (size_t p = 0; p < m->patch.n; p++)
 		for (uint32_t i = start[p]; i < start[p + 1]; i++)
-			if (m->triangle_surface[m->element_triangle[i]] != m->patch_surface[p])
+			if (m->triangle.surface[m->element.triangle[i]] != m->patch.surface[p])
 				return err_set(e, "array patch_surface: patch %zu holds element %"
 				               PRIu32 " of another surface", p, i);
 	return 0;
@@ -364,18 +364,18 @@ static int check_patches(const struct model *m, struct err *e)
 
 static int check_loops(const struct model *m, struct err *e)
 {
-	return check_starts("patch_loop", m->patch_loop, m->patches, m->loops, 0, e) ||
-	       check_starts("loop_start", m->loop_start, m->loops, m->loop_indices, 3, e) ||
-	       check_below("loop_index", m->loop_index, m->loop_indices, m->vertices, e) ? -1 : 0;
+	return err_check_starts("patch_loop", m->patch.loop, m->patch.n, m->patch.loops, 0, e) ||
+	       err_check_starts("loop_start", m->patch.loop_start, m->patch.loops, m->patch.loop_indices, 3, e) ||
+	       err_check_below("loop_index", m->patch.loop_index, m->patch.loop_indices, m->vertices, e) ? -1 : 0;
 }
 
 /* Element-sides are 32-bit, elements and splits share a signed 32-bit number. */
 static int check_counts(const struct model *m, struct err *e)
 {
-	if (m->elements == 0 || m->patches == 0 || m->triangles == 0)
+	if (m->element.n == 0 || m->patch.n == 0 || m->triangle.n == 0)
 		return err_set(e, "array element: there are no surfaces");
-	if (m->elements > INT32_MAX || m->splits > INT32_MAX || m->vertices > UINT32_MAX ||
-	    m->triangles > UINT32_MAX)
+	if (m->element.n > INT32_MAX || m->splits > INT32_MAX || m->vertices > UINT32_MAX ||
+	    m->triangle.n > UINT32_MAX)
 		return err_set(e, "array element: more than 2^31 elements or 2^32 vertices");
 	if (m->light.n > INT32_MAX)
 		return err_set(e, "array light_kind: more than 2^31 lights");

@@ -13,12 +13,12 @@ static void find_box(struct model *m)
 	double *lo = m->light.box[0], *hi = m->light.box[1];
 
 	for (int k = 0; k < 3; k++) {
-		lo[k] = m->triangles ? (double)INFINITY : 0;
+		lo[k] = m->triangle.n ? (double)INFINITY : 0;
 		hi[k] = -lo[k];
 	}
-	for (size_t i = 0; i < 3 * m->triangles; i++)
+	for (size_t i = 0; i < 3 * m->triangle.n; i++)
 		for (int k = 0; k < 3; k++) {
-			double x = m->vertex[3 * (size_t)m->triangle[i] + (size_t)k];
+			double x = m->vertex[3 * (size_t)m->triangle.corner[i] + (size_t)k];
 			lo[k] = fmin(lo[k], x);
 			hi[k] = fmax(hi[k], x);
 		}
@@ -49,7 +49,7 @@ static double unit_flux(const struct lights *l, size_t light)
 	}
 }
 
-int lights_derive(struct model *m, struct err *e)
+int model_lights_derive(struct model *m, struct err *e)
 {
 	struct lights *l = &m->light;
 
@@ -86,8 +86,8 @@ static double diagonal(const struct lights *l)
 	return v3_length(size);
 }
 
-void light_see(const struct lights *l, size_t light, const double x[3], double clear,
-               struct light_sight *s)
+void model_light_see(const struct lights *l, size_t light, const double x[3], double clear,
+                     struct light_sight *s)
 {
 	const double *direction = &l->direction[3 * light];
 
@@ -150,8 +150,8 @@ static void box_ray(const struct lights *l, size_t light, const double u[3], dou
 	v3_mad(org, -(diagonal(l) + clear), direction, org);
 }
 
-void light_ray(const struct lights *l, size_t light, const double u[3], double clear,
-               double org[3], double dir[3])
+void model_light_ray(const struct lights *l, size_t light, const double u[3], double clear,
+                     double org[3], double dir[3])
 {
 	if (l->kind[light] == LIGHT_DIRECTIONAL) {
 		memcpy(dir, &l->direction[3 * light], 3 * sizeof *dir);

@@ -23,20 +23,20 @@ struct light_sight {
  * 2 pi (1 - cos inner + (cos inner - cos outer) / 3), that of a directional light goes
  * through the shadow of the scene's bounding box across the light, m^2.
  * O(triangles + lights). 0, or -1 and e. */
-int lights_derive(struct model *m, struct err *e);
+int model_lights_derive(struct model *m, struct err *e);
 
 /* How a point sees a light, if nothing is between; the falloff between a spot's cones is
  * the extension's ((cos - cos outer) / (cos inner - cos outer))^2; `clear` is how far before
  * the light a ray ends (ray_offset). */
-void light_see(const struct lights *l, size_t light, const double x[3], double clear,
-               struct light_sight *s);
+void model_light_see(const struct lights *l, size_t light, const double x[3], double clear,
+                     struct light_sight *s);
 
 /* A ray of the light from three numbers in [0,1): all carry the same flux. */
-void light_ray(const struct lights *l, size_t light, const double u[3], double clear,
-               double org[3], double dir[3]);
+void model_light_ray(const struct lights *l, size_t light, const double u[3], double clear,
+                     double org[3], double dir[3]);
 
 /* Flux of a light in a band. */
-static inline double light_flux(const struct model *m, size_t light, int band)
+static inline double model_light_flux(const struct model *m, size_t light, int band)
 {
 	return m->light.unit_flux[light] *
 	       m->light.intensity[light * (size_t)m->bands + (size_t)band];

@@ -9,10 +9,10 @@ double solution_exitance(const struct model *m, const struct solution *s,
                          size_t element_side, int band)
 {
 	const struct materials *mt = &m->material;
-	uint32_t material = model_patch_material(m, m->element_patch[element_side >> 1]);
+	uint32_t material = model_patch_material(m, m->element.patch[element_side >> 1]);
 	int side = (int)(element_side & 1);
-	size_t here = material_at(mt, material, side) + (size_t)band;
-	size_t there = material_at(mt, material, !side) + (size_t)band;
+	size_t here = model_material_at(mt, material, side) + (size_t)band;
+	size_t there = model_material_at(mt, material, !side) + (size_t)band;
 
 	/* A black back gives nothing back and lets nothing through. */
 	if (mt->one_sided[material])
@@ -36,8 +36,8 @@ int solution_check(const struct model *m, const struct solution *s, struct err *
 	size_t bands = (size_t)s->bands, sides = s->element_sides * bands;
 	size_t channels = solution_channels(s);
 
-	if (s->bands != m->bands || s->element_sides != 2 * m->elements ||
-	    s->patch_sides != 2 * m->patches || s->sources != model_sources(m) ||
+	if (s->bands != m->bands || s->element_sides != 2 * m->element.n ||
+	    s->patch_sides != 2 * m->patch.n || s->sources != model_sources(m) ||
 	    s->groups < 1)
 		return err_set(e, "array irradiance_direct: it is not that of the model's elements");
 	if (s->groups > CHANNELS_MAX / bands)
@@ -47,19 +47,19 @@ int solution_check(const struct model *m, const struct solution *s, struct err *
 		if (s->emitter_group[i] >= s->groups)
 			return err_set(e, "array emitter_group: value %zu is %u", i,
 			               s->emitter_group[i]);
-	return check_numbers("irradiance_direct", s->direct, s->groups * sides, 0, e) ||
-	       check_numbers("irradiance_caustic", s->caustic, s->groups * sides, 0, e) ||
-	       check_numbers("irradiance_indirect", s->indirect, s->groups * sides, 0, e) ||
-	       check_numbers("irradiance_error", s->error, sides, 0, e) ||
-	       check_numbers("irradiance_error_direct", s->error_direct, sides, 0, e) ||
-	       check_numbers("irradiance_discretisation_direct", s->discretisation_direct, sides,
+	return check_numbers("irradiance_direct", s->irradiance.direct, s->groups * sides, 0, e) ||
+	       check_numbers("irradiance_caustic", s->irradiance.caustic, s->groups * sides, 0, e) ||
+	       check_numbers("irradiance_indirect", s->irradiance.indirect, s->groups * sides, 0, e) ||
+	       check_numbers("irradiance_error", s->error.sampling, sides, 0, e) ||
+	       check_numbers("irradiance_error_direct", s->error.sampling_direct, sides, 0, e) ||
+	       check_numbers("irradiance_discretisation_direct", s->error.discretisation_direct, sides,
 	                     0, e) ||
-	       check_numbers("irradiance_discretisation", s->discretisation, sides, 0, e) ||
-	       check_numbers("unshot_emission", s->unshot_emission, s->sources * bands, 1,
+	       check_numbers("irradiance_discretisation", s->error.discretisation, sides, 0, e) ||
+	       check_numbers("unshot_emission", s->unshot.emission, s->sources * bands, 1,
 	                     e) ||
-	       check_numbers("unshot_diffuse", s->unshot_diffuse, s->patch_sides * channels, 1,
+	       check_numbers("unshot_diffuse", s->unshot.diffuse, s->patch_sides * channels, 1,
 	                     e) ||
-	       check_numbers("unshot_link", s->unshot_link, 2 * s->links * channels, 1, e) ||
+	       check_numbers("unshot_link", s->unshot.link, 2 * s->links * channels, 1, e) ||
 	       check_numbers("shot", s->shot, 2 * s->rows * channels, 0, e) ||
 	       check_numbers("round", s->round, ROUND_TERMS, 0, e) ||
 	       check_numbers("ledger", s->ledger, LEDGER_TERMS * channels, 1, e) ? -1 : 0;
@@ -72,8 +72,8 @@ double solution_mean_error(const struct model *m, const struct solution *s)
 
 	for (size_t es = 0; es < s->element_sides; es++)
 		for (size_t k = 0; k < bands; k++) {
-			double area = m->element_area[es >> 1];
-			error += area * s->error[es * bands + k];
+			double area = m->element.area[es >> 1];
+			error += area * s->error.sampling[es * bands + k];
 			all += area * solution_irradiance(s, es, (int)k);
 		}
 	return all > 0 ? error / all : 0;
@@ -86,8 +86,8 @@ double solution_relative_rms(const struct model *m, const struct solution *s,
 	double square = 0, all = 0, area = 0;
 
 	for (size_t es = 0; es < s->element_sides; es++) {
-		double a = m->element_area[es >> 1];
-		if (!model_side_modelled(m, 2 * m->element_patch[es >> 1] + (uint32_t)(es & 1)))
+		double a = m->element.area[es >> 1];
+		if (!model_side_modelled(m, 2 * m->element.patch[es >> 1] + (uint32_t)(es & 1)))
 			continue;
 		for (size_t k = 0; k < bands; k++) {
 			square += a * x[es * bands + k] * x[es * bands + k];
@@ -100,9 +100,9 @@ double solution_relative_rms(const struct model *m, const struct solution *s,
 
 void solution_free(struct solution *s)
 {
-	double *array[] = { s->direct, s->caustic, s->indirect, s->error, s->error_direct, s->discretisation,
-		s->discretisation_direct,
-		s->unshot_emission, s->unshot_diffuse, s->unshot_link, s->shot, s->ledger };
+	double *array[] = { s->irradiance.direct, s->irradiance.caustic, s->irradiance.indirect, s->error.sampling, s->error.sampling_direct, s->error.discretisation,
+		s->error.discretisation_direct,
+		s->unshot.emission, s->unshot.diffuse, s->unshot.link, s->shot, s->ledger };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);

@@ -12,6 +12,31 @@
  * and what was unshot then. */
 enum { ROUND_LEAST, ROUND_NEXT, ROUND_WORK, ROUND_UNSHOT, ROUND_TERMS };
 
+/* Irradiance by the paths that light came. */
+struct irradiance {
+	double *direct;            /* straight from emitters */
+	double *caustic;           /* from emitters by directional or ideal events only */
+	double *indirect;          /* the rest */
+};
+
+/* What the sum of the three may be off by. [2E][bands] */
+struct irradiance_error {
+	double *sampling;          /* standard error from the form factors' sampling */
+	double *sampling_direct;   /* what emitters' rows have in it */
+	double *discretisation;    /* estimated root mean square, over the element, of what
+	                              interpolation misses */
+	double *discretisation_direct; /* the same of light straight from emitters */
+};
+
+/* Flux still to be shot. */
+struct unshot {
+	double *emission;          /* [2P+L][bands] not yet sent by emitters */
+	double *diffuse;           /* [2P][channels] to leave diffusely */
+	double *link;              /* [links][2][channels] to leave by the lobes of a link's
+	                              target: first what has met only emitters, directional
+	                              and ideal events so far, then the rest */
+};
+
 /* Index of element-side s, band b, group g: ((g 2E + s) bands + b). The solver keeps
  * groups and bands together, as channels: g bands + b. */
 struct solution {
@@ -21,15 +46,8 @@ struct solution {
 	uint32_t *emitter_group;   /* [emitters] group of what it emits, 0 if nothing */
 	size_t element_sides;      /* 2 E */
 	int bands;
-	double *direct;            /* irradiance straight from emitters */
-	double *caustic;           /* from emitters by directional or ideal events only */
-	double *indirect;          /* the rest */
-	double *error;             /* [2E][bands] standard error of their sum from
-	                              the form factors' sampling */
-	double *error_direct;      /* [2E][bands] what emitters' rows have in it */
-	double *discretisation;    /* [2E][bands] estimated root mean square, over the
-	                              element, of what interpolation misses of their sum */
-	double *discretisation_direct; /* [2E][bands] the same of light straight from emitters */
+	struct irradiance irradiance; /* [groups][2E][bands] */
+	struct irradiance_error error;
 
 	/* The solver's state, for shoot --resume: what is still to be shot, what each
 	 * row has sent so far, where the rest went. */
@@ -37,12 +55,8 @@ struct solution {
 	size_t sources;            /* 2 P + L, punctual lights behind patch-sides */
 	size_t links;              /* of all shards, in the solver's order */
 	size_t rows;               /* of all shards, in order */
-	double *unshot_emission;   /* [2P+L][bands] flux not yet sent by emitters */
-	double *unshot_diffuse;    /* [2P][channels] flux to leave diffusely */
-	double *unshot_link;       /* [links][2][channels] flux to leave by the lobes of a
-	                              link's target: first what has met only emitters,
-	                              directional and ideal events so far, then the rest */
-	double *shot;              /* [rows][2][channels] flux sent, split likewise */
+	struct unshot unshot;
+	double *shot;              /* [rows][2][channels] flux sent, split as unshot.link */
 	double *ledger;            /* [LEDGER_TERMS][channels] flux */
 	uint64_t shots;
 	double round[ROUND_TERMS];
@@ -55,8 +69,8 @@ enum { LEDGER_EMITTED, LEDGER_ABSORBED, LEDGER_ESCAPED, LEDGER_LOST, LEDGER_CUT,
 static inline uint32_t solution_group(const struct solution *s, const struct model *m,
                                       uint32_t source)
 {
-	return s->emitter_group[source < 2 * m->patches ? model_patch_material(m, source >> 1)
-	                                                : m->material.n + source - 2 * m->patches];
+	return s->emitter_group[source < 2 * m->patch.n ? model_patch_material(m, source >> 1)
+	                                                : m->material.n + source - 2 * m->patch.n];
 }
 
 static inline size_t solution_channels(const struct solution *s)
@@ -72,7 +86,7 @@ static inline double solution_irradiance(const struct solution *s, size_t elemen
 	double h = 0;
 
 	for (size_t g = 0; g < s->groups; g++, i += s->element_sides * (size_t)s->bands)
-		h += s->direct[i] + s->caustic[i] + s->indirect[i];
+		h += s->irradiance.direct[i] + s->irradiance.caustic[i] + s->irradiance.indirect[i];
 	return h;
 }
 

@@ -34,7 +34,7 @@ static uint32_t by_depth(const struct ff_job *j, const struct chains *c, uint32_
 static void send(struct ff_thread *t)
 {
 	const struct ff_job *j = t->job;
-	uint32_t sides = 2 * (uint32_t)j->m->patches, step = sides / SIDES + 1;
+	uint32_t sides = 2 * (uint32_t)j->m->patch.n, step = sides / SIDES + 1;
 
 	for (uint32_t ps = 0; ps < sides; ps += step) {
 		if (!j->is_source[ps])
@@ -46,7 +46,7 @@ static void send(struct ff_thread *t)
 			uint32_t el = ff_point(j, ps >> 1, rng_sobol(i, 0, seed),
 			                       rng_sobol(i, 1, seed), x);
 			ff_normal(j, el, (int)(ps & 1), n);
-			lobe_sample_cosine(n, u, dir);
+			bsdf_sample_cosine(n, u, dir);
 			ray_leave(j->rays, n, x);
 			ff_follow(t, x, dir, 1, 0);
 		}
@@ -59,35 +59,35 @@ static uint32_t count_chains(const struct ff_job *j, const struct chains *all, u
 {
 	struct chains c;
 	uint32_t *count = mem_new(all->events, sizeof *count, "chains", e);
-	int bad = chains_init(&c, j->m, most, e) || !count;
+	int bad = bsdf_chains_init(&c, j->m, most, e) || !count;
 
 	for (uint32_t i = 0; !bad && i < all->n; i++) {
 		for (uint32_t k = 0; k < all->events; k++) {
-			uint32_t n = chains_count(all, i)[k];
+			uint32_t n = bsdf_chains_count(all, i)[k];
 			count[k] = n < c.most[k] ? n : c.most[k];
 		}
-		bad = chains_find(&c, count, e) == CHAIN_NONE;
+		bad = bsdf_chains_find(&c, count, e) == CHAIN_NONE;
 	}
 	uint32_t n = bad ? CHAIN_NONE : (uint32_t)c.n;
-	chains_free(&c);
+	bsdf_chains_free(&c);
 	free(count);
 	return n;
 }
 
-int ff_find_chain_most(struct ff_job *j, struct err *e)
+int ff_find_chain_limit(struct ff_job *j, struct err *e)
 {
 	struct ff_thread t = { .job = j };
-	size_t aim = ROOM / (2 * j->m->patches + 1);
+	size_t aim = ROOM / (2 * j->m->patch.n + 1);
 	uint32_t n = 0, coloured = 0;
 
 	aim = aim < CHAINS_LEAST ? CHAINS_LEAST : aim > CHAINS_AIM ? CHAINS_AIM : aim;
 	j->chain_most = CHANGES;
-	int bad = tally_init(&t.tally, j->m, &j->places, j->has_lobe, j->chain_most, e);
+	int bad = ff_tally_init(&t.tally, j->m, &j->places, j->has_lobe, j->chain_most, e);
 	if (!bad)
 		j->chain_most = by_depth(j, &t.tally.chains, &coloured);
 	if (!bad && coloured) {
-		tally_free(&t.tally);
-		bad = tally_init(&t.tally, j->m, &j->places, j->has_lobe, j->chain_most, e);
+		ff_tally_free(&t.tally);
+		bad = ff_tally_init(&t.tally, j->m, &j->places, j->has_lobe, j->chain_most, e);
 	}
 	if (!bad && coloured) {
 		t.rng = rng_seed(j->o.seed, 0);
@@ -97,6 +97,6 @@ int ff_find_chain_most(struct ff_job *j, struct err *e)
 		       n != CHAIN_NONE && j->chain_most > CHANGES)
 			j->chain_most = (j->chain_most * 3 + 1) / 4;
 	}
-	tally_free(&t.tally);
+	ff_tally_free(&t.tally);
 	return bad || n == CHAIN_NONE ? -1 : 0;
 }

@@ -61,8 +61,8 @@ static void solve(const struct normal *a, double *x, double *r, double *p, doubl
 	}
 }
 
-int ff_close(const struct doubt *doubt, size_t n, size_t rows, const double *missing,
-             const uint8_t *closed, double *change, struct err *e)
+int ff_closure(const struct doubt *doubt, size_t n, size_t rows, const double *missing,
+               const uint8_t *closed, double *change, struct err *e)
 {
 	double *room = mem_new(5 * rows, sizeof *room, "closing rows", e);
 	double *x = room, *r = room + rows, *p = r + rows, *q = p + rows;

@@ -1,4 +1,4 @@
-/* Closed rows made to add up, by least squares (private to lib/ff_*.c). */
+/* Closed rows made to add up, by least squares (private to lib/ff). */
 #ifndef TWOPASS_CLOSURE_H
 #define TWOPASS_CLOSURE_H
 
@@ -19,7 +19,7 @@ struct doubt {
  * l_j), the multipliers l by conjugate gradients. Both ways of a pair change alike, so
  * reciprocity stays. doubt: [n], change: [n] out. Rows without doubts stay as they are.
  * O(n x iterations). 0, or -1 and e. */
-int ff_close(const struct doubt *doubt, size_t n, size_t rows, const double *missing,
-             const uint8_t *closed, double *change, struct err *e);
+int ff_closure(const struct doubt *doubt, size_t n, size_t rows, const double *missing,
+               const uint8_t *closed, double *change, struct err *e);
 
 #endif

@@ -34,14 +34,14 @@ enum {
 
 struct order {
 	const struct chains *chains;
-	struct capture c;
+	struct ff_incident c;
 	size_t index;
 };
 
 static int by_source(const void *a, const void *b)
 {
 	const struct order *x = a, *y = b;
-	int d = x->c.chain == y->c.chain ? 0 : chains_compare(x->chains, x->c.chain, y->c.chain);
+	int d = x->c.chain == y->c.chain ? 0 : ff_chains_compare(x->chains, x->c.chain, y->c.chain);
 	if (d)
 		return d;
 	if (x->c.source != y->c.source)
@@ -51,8 +51,8 @@ static int by_source(const void *a, const void *b)
 
 static int sort_captures(struct ff_thread *t, struct err *e)
 {
-	struct capture *c = t->captures.data;
-	size_t n = t->captures.n;
+	struct ff_incident *c = t->incident.data;
+	size_t n = t->incident.n;
 	struct order *o = mem_new(n, sizeof *o, "light paths", e);
 
 	if (!o)
@@ -69,7 +69,7 @@ static int sort_captures(struct ff_thread *t, struct err *e)
 
 /* A point of a patch-side to draw a line from: with hemicubes, where one of them stands. */
 static void line_begin(const struct ff_thread *t, uint32_t ps, uint32_t i, uint64_t seed,
-                       struct capture *c)
+                       struct ff_incident *c)
 {
 	const struct ff_job *j = t->job;
 
@@ -92,7 +92,7 @@ static int probe(struct ff_thread *t, uint32_t ps, uint32_t source, uint32_t beg
 	uint64_t seed = rng_mix(j->o.seed ^ (((uint64_t)ps << 32) | source));
 
 	for (uint32_t i = begin; i < end; i++) {
-		struct capture c = { .source = source };
+		struct ff_incident c = { .source = source };
 		double y[3], nx[3], ny[3];
 		line_begin(t, ps, i, seed, &c);
 		uint32_t el = ff_point(j, source >> 1, rng_sobol(i, 2, seed), rng_sobol(i, 3, seed), y);
@@ -110,7 +110,7 @@ static int probe(struct ff_thread *t, uint32_t ps, uint32_t source, uint32_t beg
 			continue;
 		v3_normalise(c.l);
 		c.w = cx * cy / (r2 * r2);
-		if (vec_append(to, &c, 1, sizeof c, e))
+		if (mem_append(to, &c, 1, sizeof c, e))
 			return -1;
 	}
 	return 0;
@@ -124,21 +124,21 @@ static int probe_unseen(struct ff_thread *t, uint32_t ps, const uint8_t *met, do
 {
 	const struct ff_job *j = t->job;
 
-	for (uint32_t q = 0; q < 2 * j->m->patches; q++) {
-		size_t before = t->captures.n;
+	for (uint32_t q = 0; q < 2 * j->m->patch.n; q++) {
+		size_t before = t->incident.n;
 		if (met[q] || !j->emits[q] || q >> 1 == ps >> 1)
 			continue;
-		if (probe(t, ps, q, 0, PROBES, &t->captures, e))
+		if (probe(t, ps, q, 0, PROBES, &t->incident, e))
 			return -1;
-		for (size_t i = before; i < t->captures.n; i++)
-			((struct capture *)t->captures.data)[i].w *=
-				all * j->m->patch_area[q >> 1] / (PI * PROBES);
+		for (size_t i = before; i < t->incident.n; i++)
+			((struct ff_incident *)t->incident.data)[i].w *=
+				all * j->m->patch.area[q >> 1] / (PI * PROBES);
 	}
 	return 0;
 }
 
 /* How many captures of equal weight these are worth. */
-static double worth(const struct capture *c, size_t n)
+static double worth(const struct ff_incident *c, size_t n)
 {
 	double sum = 0, squares = 0;
 
@@ -151,9 +151,9 @@ static double worth(const struct capture *c, size_t n)
 
 /* Captures of an emitter that is seen straight: a line for each lobe ray, or the n that
  * there are already where they are worth more (a large emitter near by). */
-static const struct capture *straight_captures(struct ff_thread *t, uint32_t ps,
-                                               const struct capture *c, size_t *n,
-                                               uint32_t rays, struct err *e)
+static const struct ff_incident *straight_captures(struct ff_thread *t, uint32_t ps,
+                                                   const struct ff_incident *c, size_t *n,
+                                                   uint32_t rays, struct err *e)
 {
 	t->pairs.n = 0;
 	if (probe(t, ps, c->source, 0, rays, &t->pairs, e))
@@ -185,12 +185,12 @@ static int bin_captures(struct ff_thread *t, uint32_t ps, struct err *e)
 	uint64_t seed = rng_mix(j->o.seed ^ ~(uint64_t)ps);
 
 	for (uint32_t i = 0; i < BIN_RINGS * BIN_SECTORS * 16; i++) {
-		struct capture c = { .source = FF_ANY, .w = 1, .view = i % j->o.points };
+		struct ff_incident c = { .source = FF_ANY, .w = 1, .view = i % j->o.points };
 		double n[3], u[2] = { rng_sobol(i, 2, seed), rng_sobol(i, 3, seed) };
 		c.element = ff_point(j, ps >> 1, rng_sobol(i, 0, seed), rng_sobol(i, 1, seed), c.x);
 		ff_normal(j, c.element, (int)(ps & 1), n);
-		lobe_sample_cosine(n, u, c.l);
-		if (vec_append(&t->captures, &c, 1, sizeof c, e))
+		bsdf_sample_cosine(n, u, c.l);
+		if (mem_append(&t->incident, &c, 1, sizeof c, e))
 			return -1;
 	}
 	return 0;
@@ -198,38 +198,38 @@ static int bin_captures(struct ff_thread *t, uint32_t ps, struct err *e)
 
 /* One lobe ray of a capture: about R on the side of incidence, or about T = -L on
  * the other. */
-static void cast_one(struct ff_thread *t, const struct capture *c, int side, int transmitted,
+static void cast_one(struct ff_thread *t, const struct ff_incident *c, int side, int transmitted,
                      double exponent, const double u[2], ff_cast_fn *cast)
 {
 	double n[3], axis[3], dir[3];
 	int out = transmitted ? !side : side;
 
 	ff_normal(t->job, c->element, out, n);
-	lobe_mirror(c->l, n, axis);
+	bsdf_lobe_mirror(c->l, n, axis);
 	if (transmitted)
 		for (int k = 0; k < 3; k++)
 			axis[k] = -c->l[k];
-	double w = lobe_scatter(t->job->m->lobe, exponent, axis, n, u, dir);
-	tally_rest(&t->tally, 0)->lost += 1 - w;
+	double w = bsdf_lobe_scatter(t->job->m->lobe, exponent, axis, n, u, dir);
+	ff_tally_rest(&t->tally, 0)->lost += 1 - w;
 	if (w > 0)
 		cast(t, c, out, dir, w);
 }
 
 static int is_light(const struct ff_job *j, uint32_t source)
 {
-	return source >= 2 * j->m->patches;
+	return source >= 2 * j->m->patch.n;
 }
 
 static void centroid(const struct model *m, uint32_t patch, double c[3])
 {
 	memset(c, 0, 3 * sizeof *c);
-	for (uint32_t el = m->patch_start[patch]; el < m->patch_start[patch + 1]; el++)
+	for (uint32_t el = m->patch.start[patch]; el < m->patch.start[patch + 1]; el++)
 		for (int k = 0; k < 3; k++)
-			v3_mad(c, m->element_area[el] / (3 * m->patch_area[patch]),
-			       &m->vertex[3 * (size_t)m->element[3 * (size_t)el + (size_t)k]], c);
+			v3_mad(c, m->element.area[el] / (3 * m->patch.area[patch]),
+			       &m->vertex[3 * (size_t)m->element.corner[3 * (size_t)el + (size_t)k]], c);
 }
 
-static void mean_direction(const struct capture *c, size_t n, double mean[3])
+static void mean_direction(const struct ff_incident *c, size_t n, double mean[3])
 {
 	memset(mean, 0, 3 * sizeof *mean);
 	for (size_t i = 0; i < n; i++)
@@ -240,9 +240,9 @@ static void mean_direction(const struct capture *c, size_t n, double mean[3])
 /* Captures as the paper has them: light comes from the source's centroid to that of the
  * patch, all over which it is alike. By a mirror, from a punctual light, or from a source
  * whose centroid is below the horizon, it comes from the mean of the captures c. */
-static const struct capture *centroid_captures(struct ff_thread *t, uint32_t ps,
-                                               const struct capture *c, size_t *n,
-                                               uint32_t rays, struct err *e)
+static const struct ff_incident *centroid_captures(struct ff_thread *t, uint32_t ps,
+                                                   const struct ff_incident *c, size_t *n,
+                                                   uint32_t rays, struct err *e)
 {
 	const struct ff_job *j = t->job;
 	uint64_t seed = rng_mix(j->o.seed ^ ps);
@@ -260,10 +260,10 @@ static const struct capture *centroid_captures(struct ff_thread *t, uint32_t ps,
 	v3_normalise(l);
 	t->pairs.n = 0;
 	for (uint32_t i = 0; i < rays; i++) {
-		struct capture all = { .source = c->source, .chain = c->chain, .w = 1 };
+		struct ff_incident all = { .source = c->source, .chain = c->chain, .w = 1 };
 		line_begin(t, ps, i, seed, &all);
 		memcpy(all.l, l, sizeof l);
-		if (vec_append(&t->pairs, &all, 1, sizeof all, e))
+		if (mem_append(&t->pairs, &all, 1, sizeof all, e))
 			return NULL;
 	}
 	*n = rays;
@@ -273,7 +273,7 @@ static const struct capture *centroid_captures(struct ff_thread *t, uint32_t ps,
 /* The G row of one link and lobe: `rays` rays, shared out among its captures in
  * proportion to their weights. (At even steps through captures of a sequence, weights
  * that alternate would be in step with them.) */
-static int lobe_row(struct ff_thread *t, uint32_t ps, const struct capture *c, size_t n,
+static int lobe_row(struct ff_thread *t, uint32_t ps, const struct ff_incident *c, size_t n,
                     int transmitted, uint32_t rays, ff_cast_fn *cast, struct ff_batch *b,
                     struct err *e)
 {
@@ -298,11 +298,11 @@ static int lobe_row(struct ff_thread *t, uint32_t ps, const struct capture *c, s
 	}
 	ff_lobes_cast(t);
 	t->lobe_depth = 0;
-	return tally_finish(&t->tally, b, (ps & ~1u) | (uint32_t)out,
-	                    transmitted ? FF_TRANSMITTED : FF_REFLECTED, rays, rays, e);
+	return ff_tally_finish(&t->tally, b, (ps & ~1u) | (uint32_t)out,
+	                       transmitted ? FF_TRANSMITTED : FF_REFLECTED, rays, rays, e);
 }
 
-static int put_link(struct ff_thread *t, uint32_t ps, const struct capture *c, size_t n,
+static int add_link(struct ff_thread *t, uint32_t ps, const struct ff_incident *c, size_t n,
                     uint32_t rays, ff_cast_fn *cast, struct ff_batch *b, struct err *e)
 {
 	const struct materials *mt = &t->job->m->material;
@@ -321,12 +321,12 @@ static int put_link(struct ff_thread *t, uint32_t ps, const struct capture *c, s
 		if (lobe_row(t, ps, c, n, transmitted, rays, cast, b, e))
 			return -1;
 	}
-	return vec_append(&b->link_target, &ps, 1, sizeof ps, e) ||
-	       vec_append(&b->link_source, &c[0].source, 1, sizeof c->source, e) ||
-	       vec_append(&b->link_last, &c[n - 1].source, 1, sizeof c->source, e) ||
-	       vec_append(&b->link_chain, &c->chain, 1, sizeof c->chain, e) ||
-	       vec_append(&b->link_direction, direction, 3, sizeof *direction, e) ||
-	       vec_append(&b->link_row, row, 2, sizeof *row, e) ? -1 : 0;
+	return mem_append(&b->link_target, &ps, 1, sizeof ps, e) ||
+	       mem_append(&b->link_source, &c[0].source, 1, sizeof c->source, e) ||
+	       mem_append(&b->link_last, &c[n - 1].source, 1, sizeof c->source, e) ||
+	       mem_append(&b->link_chain, &c->chain, 1, sizeof c->chain, e) ||
+	       mem_append(&b->link_direction, direction, 3, sizeof *direction, e) ||
+	       mem_append(&b->link_row, row, 2, sizeof *row, e) ? -1 : 0;
 }
 
 /* Bins of FF_ANY are told apart by the direction: sort them into bins first. */
@@ -336,21 +336,21 @@ static int bin_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct 
 	struct vec all, bin = { 0 };
 	int bad = 0;
 
-	t->captures.n = 0;
+	t->incident.n = 0;
 	if (bin_captures(t, ps, e))
 		return -1;
-	all = t->captures;
+	all = t->incident;
 	for (uint32_t k = 0; !bad && k < BIN_RINGS * BIN_SECTORS; k++) {
-		const struct capture *c = all.data;
+		const struct ff_incident *c = all.data;
 		bin.n = 0;
 		for (size_t i = 0; !bad && i < all.n; i++) {
 			double n[3];
 			ff_normal(t->job, c[i].element, (int)(ps & 1), n);
 			if (direction_bin(n, c[i].l) == k)
-				bad = vec_append(&bin, &c[i], 1, sizeof c[i], e);
+				bad = mem_append(&bin, &c[i], 1, sizeof c[i], e);
 		}
 		if (!bad && bin.n)
-			bad = put_link(t, ps, bin.data, bin.n, BIN_RAYS, cast, b, e);
+			bad = add_link(t, ps, bin.data, bin.n, BIN_RAYS, cast, b, e);
 	}
 	free(bin.data);
 	return bad;
@@ -361,7 +361,7 @@ static int bin_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct 
  * about the first (patches are numbered along a spatial tree, so neighbours in number
  * are mostly neighbours in space), and until they weigh enough for a row of their own.
  * Light from within a cluster is spread over it as its form factors are. */
-static size_t cluster_end(const struct ff_job *j, const struct capture *c, size_t i, size_t n,
+static size_t cluster_end(const struct ff_job *j, const struct ff_incident *c, size_t i, size_t n,
                           double enough, double *w)
 {
 	const double narrow = .97; /* cos 14 degrees */
@@ -385,7 +385,7 @@ static size_t cluster_end(const struct ff_job *j, const struct capture *c, size_
  * EMITTER_LANDINGS times what its own row would send here of as many: where it is small or
  * far, its light on the patch-side is a small part of what it gives. Lobes that are few are
  * all that evens out one another's noise, so they get more. */
-static uint32_t cluster_rays(const struct ff_job *j, uint32_t ps, const struct capture *c,
+static uint32_t cluster_rays(const struct ff_job *j, uint32_t ps, const struct ff_incident *c,
                              double share, size_t emitters)
 {
 	double rays = share * j->o.lobe_rays, least = MIN_LOBE_RAYS;
@@ -393,7 +393,7 @@ static uint32_t cluster_rays(const struct ff_job *j, uint32_t ps, const struct c
 	if (ff_emits(j, c->source)) {
 		double all = (double)j->o.lobe_rays * j->o.emitter_gain;
 		double lands = is_light(j, c->source) ? 1
-		             : share * j->m->patch_area[ps >> 1] / j->m->patch_area[c->source >> 1];
+		             : share * j->m->patch.area[ps >> 1] / j->m->patch.area[c->source >> 1];
 		lands *= EMITTER_LANDINGS * fmax(1, FEW_LOBES / (double)j->lobes);
 		rays = all * fmin(1. / (double)emitters, lands);
 		least = MIN_EMITTER_RAYS;
@@ -402,7 +402,7 @@ static uint32_t cluster_rays(const struct ff_job *j, uint32_t ps, const struct c
 }
 
 /* Emitters, by chain, among sorted captures. */
-static size_t count_emitters(const struct ff_job *j, const struct capture *c, size_t n)
+static size_t count_emitters(const struct ff_job *j, const struct ff_incident *c, size_t n)
 {
 	size_t emitters = 0;
 
@@ -412,41 +412,41 @@ static size_t count_emitters(const struct ff_job *j, const struct capture *c, si
 	return emitters;
 }
 
-int ff_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch *b,
-             struct err *e)
+int ff_directional_rows(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch *b,
+                        struct err *e)
 {
 	const struct ff_job *j = t->job;
-	const struct capture *c;
-	uint8_t *met = mem_new(2 * j->m->patches, 1, "sources met", e);
+	const struct ff_incident *c;
+	uint8_t *met = mem_new(2 * j->m->patch.n, 1, "sources met", e);
 	double all = 0;
-	size_t own = t->captures.n, emitters = 0;
+	size_t own = t->incident.n, emitters = 0;
 	int bad = !met;
 
-	c = t->captures.data;
+	c = t->incident.data;
 	for (size_t i = 0; !bad && i < own; i++) {
 		all += c[i].w;
 		if (c[i].chain == 0)
 			met[c[i].source] = 1;
 	}
-	bad = bad || probe_unseen(t, ps, met, all, e) || ff_light_captures(t, ps, e) ||
+	bad = bad || probe_unseen(t, ps, met, all, e) || ff_light_incident(t, ps, e) ||
 	      sort_captures(t, e);
 	free(met);
-	c = t->captures.data;
+	c = t->incident.data;
 	if (!bad)
-		emitters = count_emitters(j, c, t->captures.n);
-	for (size_t i = 0, end; !bad && i < t->captures.n; i = end) {
+		emitters = count_emitters(j, c, t->incident.n);
+	for (size_t i = 0, end; !bad && i < t->incident.n; i = end) {
 		double w = 0;
-		end = cluster_end(j, c, i, t->captures.n, all / CLUSTER_SHARE, &w);
+		end = cluster_end(j, c, i, t->incident.n, all / CLUSTER_SHARE, &w);
 		double share = all > 0 ? fmin(1, w / all) : 0;
 		uint32_t rays = cluster_rays(j, ps, &c[i], share, emitters);
 		size_t many = end - i;
-		const struct capture *of = &c[i];
+		const struct ff_incident *of = &c[i];
 		if (j->o.centroid)
 			of = centroid_captures(t, ps, of, &many, rays, e);
 		else if (of->chain == 0 && !is_light(j, of->source) && j->emits[of->source])
 			of = straight_captures(t, ps, of, &many, rays, e);
-		bad = !of || put_link(t, ps, of, many, rays, cast, b, e);
-		c = t->captures.data;
+		bad = !of || add_link(t, ps, of, many, rays, cast, b, e);
+		c = t->incident.data;
 	}
 	return bad ? bad : bin_links(t, ps, cast, b, e);
 }

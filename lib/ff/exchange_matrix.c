@@ -25,15 +25,15 @@ struct matrix {
 	double *area;                 /* [n] */
 	int curved;                   /* some side is: it has no facets, its pairs are by rays */
 	struct facet_set facets;
-	struct body_set bodies;
-	struct joint_table table;     /* empty unless side i is facet i, and nothing ever between */
+	struct occluder_set bodies;
+	struct cubature_pair_table table;     /* empty unless side i is facet i, and nothing ever between */
 	double centre[3];
 	struct thread *thread;
 	/* The band in work: rows [first, first + rows), all columns. */
 	size_t first, rows;
 	float *e32;                   /* [rows][n] exchange areas, one of them */
 	double *e64;
-	struct batch_row *row;        /* [rows] */
+	struct ff_batch_row *row;        /* [rows] */
 	struct tally_rest *rest;      /* [rows] what of them no side receives */
 	uint8_t *closed;              /* [rows] what leaves the side arrives on sides */
 	struct vec doubt;             /* struct doubt, by pair */
@@ -64,12 +64,12 @@ static double pair(struct matrix *m, struct thread *t, size_t a, size_t b)
 
 	for (uint32_t f = start[p]; f < start[p + 1]; f++)
 		for (uint32_t g = start[q]; g < start[q + 1]; g++) {
-			sum += exchange(&t->x, &m->facets, f, &m->facets, g, &off, &t->e);
+			sum += occ_exchange(&t->x, &m->facets, f, &m->facets, g, &off, &t->e);
 			error += off;
 		}
 	if (error > 2 * t->x.o.relative * sum) {
 		struct doubt d = { (uint32_t)i, (uint32_t)j, error };
-		vec_append(&t->doubt, &d, 1, sizeof d, &t->e);
+		mem_append(&t->doubt, &d, 1, sizeof d, &t->e);
 	}
 	return sum;
 }
@@ -79,12 +79,12 @@ static double pair(struct matrix *m, struct thread *t, size_t a, size_t b)
 static void do_span(struct matrix *m, struct thread *t, size_t r, size_t begin, size_t end)
 {
 	size_t i = m->first + r;
-	double one[JOINT_ONE], x[4];
+	double one[PAIR_ONE], x[4];
 
 	if (m->table.n)
-		joint_one(&m->table, i, one);
+		geo_pair_one(&m->table, i, one);
 	for (size_t j = begin; j < end; j += 4) {
-		int known = m->table.n ? joint_four(&m->table, one, j, j < i, x) : 0;
+		int known = m->table.n ? geo_pair_four(&m->table, one, j, j < i, x) : 0;
 		for (size_t k = 0; k < 4 && j + k < end; k++) {
 			if (!(known >> k & 1)) {
 				set(m, r, j + k, pair(m, t, i, j + k));
@@ -136,7 +136,7 @@ static int gather_doubts(struct matrix *m, struct err *e)
 		struct vec *v = &m->thread[t].doubt;
 		if (m->thread[t].e.set)
 			return err_set(e, "%s", m->thread[t].e.text);
-		if (vec_append(&m->doubt, v->data, v->n, sizeof(struct doubt), e))
+		if (mem_append(&m->doubt, v->data, v->n, sizeof(struct doubt), e))
 			return -1;
 		v->n = 0;
 	}
@@ -157,24 +157,24 @@ static int is_curved(const struct matrix *m, size_t i)
  * these are. */
 static double share_rest(struct matrix *m, size_t r, struct ff_rest *rest)
 {
-	struct batch_row *row = &m->row[r];
+	struct ff_batch_row *row = &m->row[r];
 	size_t i = m->first + r;
 	uint32_t emits = m->job->emits[row->side];
 	uint32_t rays = m->curved ? m->job->o.rays * (emits ? m->job->o.emitter_gain : 1) : REST_RAYS;
 	int all = is_curved(m, i);
 	double lost, hits = 0, variance = 0;
 
-	ff_rest_cast(rest, m->job, row->side, rays);
+	ff_remainder_cast(rest, m->job, row->side, rays);
 	lost = rest->escaped + rest->black;
 	for (size_t j = 0; m->curved && j < m->n; j++)
-		hits += all || is_curved(m, j) ? ff_rest_landed(rest, m->side[j]) : 0;
+		hits += all || is_curved(m, j) ? ff_remainder_landed(rest, m->side[j]) : 0;
 	if (!(hits + lost > 0))
 		return 0;
 	double each = row->residual / (hits + lost);
 	for (size_t j = 0; hits > 0 && j < m->n; j++)
 		if (all || is_curved(m, j)) {
-			set(m, r, j, each * ff_rest_landed(rest, m->side[j]) * m->area[i]);
-			variance += each * each * ff_rest_variance(rest, m->side[j]);
+			set(m, r, j, each * ff_remainder_landed(rest, m->side[j]) * m->area[i]);
+			variance += each * each * ff_remainder_variance(rest, m->side[j]);
 		}
 	if (hits > 0) {
 		/* All rays in one place tell no more than a ray's weight. */
@@ -189,7 +189,7 @@ static double share_rest(struct matrix *m, size_t r, struct ff_rest *rest)
  * others, what nothing received by formula. */
 static void judge(struct matrix *m, size_t r, struct ff_rest *rest)
 {
-	struct batch_row *row = &m->row[r];
+	struct ff_batch_row *row = &m->row[r];
 	double area = m->area[m->first + r], sum = 0;
 
 	for (size_t j = 0; j < m->n; j++)
@@ -245,7 +245,7 @@ static int close_rows(struct matrix *m, struct err *e)
 
 	for (size_t r = 0; !bad && r < m->rows; r++)
 		missing[r] = m->closed[r] ? m->row[r].residual * m->area[r] : 0;
-	bad = bad || ff_close(d, m->doubt.n, m->rows, missing, m->closed, change, e);
+	bad = bad || ff_closure(d, m->doubt.n, m->rows, missing, m->closed, change, e);
 	for (size_t k = 0; !bad && k < m->doubt.n; k++) {
 		double x = fmax(0, get(m, d[k].i, d[k].j) + change[k]);
 		set(m, d[k].i, d[k].j, x);
@@ -258,16 +258,16 @@ static int close_rows(struct matrix *m, struct err *e)
 
 static int put_row(struct ff_batch *b, const struct matrix *m, size_t r, struct err *e)
 {
-	struct batch_row *row = &m->row[r];
+	struct ff_batch_row *row = &m->row[r];
 	double area = m->area[m->first + r], sum = m->rest[r].escape + m->rest[r].black;
 
 	const void *x = m->e32 ? (const void *)(m->e32 + r * m->n) : m->e64 + r * m->n;
 
-	if (batch_begin(b, e) || batch_reserve(b, m->n, e))
+	if (ff_batch_begin(b, e) || ff_batch_reserve(b, m->n, e))
 		return -1;
-	sum += batch_put_values(b, m->side, x, m->n, 1 / area);
+	sum += ff_batch_put_values(b, m->side, x, m->n, 1 / area);
 	row->scale = sum > 0 ? 1 / sum : 0;
-	return batch_put_block(b, 0, &m->rest[r], e) || batch_put_row(b, row, e) ? -1 : 0;
+	return ff_batch_put_block(b, 0, &m->rest[r], e) || ff_batch_put_row(b, row, e) ? -1 : 0;
 }
 
 static int emit(struct matrix *m, const struct ff_sink *sink, struct ff_stats *stats,
@@ -280,13 +280,13 @@ static int emit(struct matrix *m, const struct ff_sink *sink, struct ff_stats *s
 		bad = put_row(&b, m, r, e);
 		if (bad || ((r + 1) % ROWS_AT_A_TIME && r + 1 < m->rows))
 			continue;
-		struct ff f = batch_view(&b);
+		struct ff f = ff_batch_view(&b);
 		f.to_patches = 1;
-		ff_count(stats, &f);
+		ff_stats_count(stats, &f);
 		bad = sink->put(sink->arg, &f, e);
-		batch_free(&b);
+		ff_batch_free(&b);
 	}
-	batch_free(&b);
+	ff_batch_free(&b);
 	return bad;
 }
 
@@ -332,13 +332,13 @@ static int find_sides(struct matrix *m, struct err *e)
 {
 	const struct model *model = m->job->m;
 
-	m->side = mem_new(2 * model->patches, sizeof *m->side, "patch-sides", e);
-	m->area = mem_new(2 * model->patches, sizeof *m->area, "patch-sides", e);
+	m->side = mem_new(2 * model->patch.n, sizeof *m->side, "patch-sides", e);
+	m->area = mem_new(2 * model->patch.n, sizeof *m->area, "patch-sides", e);
 	if (!m->side || !m->area)
 		return -1;
-	for (uint32_t ps = 0; ps < 2 * model->patches; ps++)
+	for (uint32_t ps = 0; ps < 2 * model->patch.n; ps++)
 		if (model_side_modelled(model, ps)) {
-			m->area[m->n] = model->patch_area[ps >> 1];
+			m->area[m->n] = model->patch.area[ps >> 1];
 			m->side[m->n++] = ps;
 		}
 	return 0;
@@ -352,39 +352,39 @@ static int tabulate(struct matrix *m, double relative, struct err *e)
 
 	for (size_t i = 0; simple && i < m->n; i++)
 		simple = start[m->side[i]] == i && start[m->side[i] + 1] == i + 1;
-	return simple ? joint_table_new(m->facets.facet, m->facets.joint, m->n, relative, m->bodies.near,
-	                                &m->table, e) : 0;
+	return simple ? geo_pair_table_new(m->facets.facet, m->facets.joint, m->n, relative, m->bodies.near,
+	                                   &m->table, e) : 0;
 }
 
 /* Nothing sends light on but by Lambert's law. */
-int ff_matrix_can(const struct ff_job *j)
+int ff_exchange_matrix_can(const struct ff_job *j)
 {
-	for (uint32_t ps = 0; ps < 2 * j->m->patches; ps++)
+	for (uint32_t ps = 0; ps < 2 * j->m->patch.n; ps++)
 		if (model_side_modelled(j->m, ps) &&
 		    (j->is_ideal[ps] || j->has_lobe[ps] || j->shoots_lobe[ps]))
 			return 0;
 	return 1;
 }
 
-int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct ff_sink *sink,
-              struct ff_stats *stats, const struct progress *progress, struct err *e)
+int ff_exchange_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct ff_sink *sink,
+                       struct ff_stats *stats, const struct progress *progress, struct err *e)
 {
 	struct matrix m = { .job = j };
 	struct exchange_options o = { .relative = j->o.f64 ? 1e-9 : 8e-7, .absolute = j->o.target,
-	                              .most = j->o.evaluations, .bodies = SIGHT_BLOCKERS,
+	                              .most = j->o.evaluations, .bodies = SHAFT_OCCLUDERS,
 	                              .crowd_rays = CROWD_RAYS };
 	size_t a = 0, b;
-	int bad = find_sides(&m, e) || facet_set_init(&m.facets, j->m, FACETS_OF_PATCHES, e) ||
-	          body_set_init(&m.bodies, j->m, e) || tabulate(&m, o.relative, e);
+	int bad = find_sides(&m, e) || occ_facet_set_init(&m.facets, j->m, FACETS_OF_PATCHES, e) ||
+	          occ_occluder_set_init(&m.bodies, j->m, e) || tabulate(&m, o.relative, e);
 
-	facet_centre(j->m, m.centre);
+	occ_facet_centre(j->m, m.centre);
 	for (size_t i = 0; !bad && i < m.n; i++)
 		m.curved |= is_curved(&m, i);
 	m.thread = mem_new((size_t)j->o.threads, sizeof *m.thread, "threads", e);
 	bad = bad || !m.thread;
 	for (int t = 0; !bad && t < j->o.threads; t++) {
-		exchanger_init(&m.thread[t].x, &o, &m.bodies, j->rays, m.centre);
-		bad = ff_rest_init(&m.thread[t].rest, j, e);
+		occ_exchanger_init(&m.thread[t].x, &o, &m.bodies, j->rays, m.centre);
+		bad = ff_remainder_init(&m.thread[t].rest, j, e);
 	}
 	while (a < m.n && m.side[a] < 2 * begin)
 		a++;
@@ -392,10 +392,10 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
 		b++;
 	bad = bad || bands(&m, a, b, sink, stats, progress, e);
 	for (int t = 0; m.thread && t < j->o.threads; t++) {
-		ff_count_pairs(stats, &m.thread[t].x.counts);
+		ff_stats_count_pairs(stats, &m.thread[t].x.counts);
 		stats->rays += m.thread[t].rest.rays;
-		exchanger_free(&m.thread[t].x);
-		ff_rest_free(&m.thread[t].rest);
+		occ_exchanger_free(&m.thread[t].x);
+		ff_remainder_free(&m.thread[t].rest);
 		free(m.thread[t].doubt.data);
 	}
 	free(m.thread);
@@ -405,8 +405,8 @@ int ff_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct
 	free(m.rest);
 	free(m.closed);
 	free(m.doubt.data);
-	joint_table_free(&m.table);
-	facet_set_free(&m.facets);
-	body_set_free(&m.bodies);
+	geo_pair_table_free(&m.table);
+	occ_facet_set_free(&m.facets);
+	occ_occluder_set_free(&m.bodies);
 	return bad ? -1 : 0;
 }

@@ -5,25 +5,25 @@
 #include "lib/data/link_key.h"
 #include "lib/ff/tally.h"
 
-int batch_begin(struct ff_batch *b, struct err *e)
+int ff_batch_begin(struct ff_batch *b, struct err *e)
 {
 	const uint64_t zero = 0;
 
 	/* Start arrays hold ends while a batch grows and a leading 0. */
 	if (b->row_block.n)
 		return 0;
-	return vec_append(&b->row_block, &zero, 1, sizeof zero, e) ||
-	       vec_append(&b->block_start, &zero, 1, sizeof zero, e) ||
-	       vec_append(&b->block_arrival, &zero, 1, sizeof zero, e) ? -1 : 0;
+	return mem_append(&b->row_block, &zero, 1, sizeof zero, e) ||
+	       mem_append(&b->block_start, &zero, 1, sizeof zero, e) ||
+	       mem_append(&b->block_arrival, &zero, 1, sizeof zero, e) ? -1 : 0;
 }
 
-int batch_reserve(struct ff_batch *b, size_t n, struct err *e)
+int ff_batch_reserve(struct ff_batch *b, size_t n, struct err *e)
 {
-	return vec_reserve(&b->column, n, sizeof(uint32_t), e) ||
-	       vec_reserve(&b->value, n, b->f64 ? sizeof(double) : sizeof(float), e) ? -1 : 0;
+	return mem_reserve(&b->column, n, sizeof(uint32_t), e) ||
+	       mem_reserve(&b->value, n, b->f64 ? sizeof(double) : sizeof(float), e) ? -1 : 0;
 }
 
-double batch_put_value(struct ff_batch *b, uint32_t column, double w)
+double ff_batch_put_value(struct ff_batch *b, uint32_t column, double w)
 {
 	((uint32_t *)b->column.data)[b->column.n++] = column;
 	if (b->f64)
@@ -31,8 +31,8 @@ double batch_put_value(struct ff_batch *b, uint32_t column, double w)
 	return (double)(((float *)b->value.data)[b->value.n++] = (float)w);
 }
 
-double batch_put_values(struct ff_batch *b, const uint32_t *column, const void *x, size_t n,
-                        double scale)
+double ff_batch_put_values(struct ff_batch *b, const uint32_t *column, const void *x, size_t n,
+                           double scale)
 {
 	uint32_t *to = (uint32_t *)b->column.data + b->column.n;
 	float *narrow = b->f64 ? NULL : (float *)b->value.data + b->value.n;
@@ -55,33 +55,33 @@ double batch_put_values(struct ff_batch *b, const uint32_t *column, const void *
 	return sum;
 }
 
-int batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *r,
-                    struct err *e)
+int ff_batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *r,
+                       struct err *e)
 {
 	uint64_t entries = b->column.n, arrivals = b->arrival_target.n;
 
-	return vec_append(&b->block_chain, &chain, 1, sizeof chain, e) ||
-	       vec_append(&b->block_start, &entries, 1, sizeof entries, e) ||
-	       vec_append(&b->block_arrival, &arrivals, 1, sizeof arrivals, e) ||
-	       vec_append(&b->escape, &r->escape, 1, sizeof r->escape, e) ||
-	       vec_append(&b->black, &r->black, 1, sizeof r->black, e) ||
-	       vec_append(&b->lost, &r->lost, 1, sizeof r->lost, e) ||
-	       vec_append(&b->cut, &r->cut, 1, sizeof r->cut, e) ? -1 : 0;
+	return mem_append(&b->block_chain, &chain, 1, sizeof chain, e) ||
+	       mem_append(&b->block_start, &entries, 1, sizeof entries, e) ||
+	       mem_append(&b->block_arrival, &arrivals, 1, sizeof arrivals, e) ||
+	       mem_append(&b->escape, &r->escape, 1, sizeof r->escape, e) ||
+	       mem_append(&b->black, &r->black, 1, sizeof r->black, e) ||
+	       mem_append(&b->lost, &r->lost, 1, sizeof r->lost, e) ||
+	       mem_append(&b->cut, &r->cut, 1, sizeof r->cut, e) ? -1 : 0;
 }
 
-int batch_put_row(struct ff_batch *b, const struct batch_row *r, struct err *e)
+int ff_batch_put_row(struct ff_batch *b, const struct ff_batch_row *r, struct err *e)
 {
 	uint64_t blocks = b->block_chain.n;
 	uint8_t kind = (uint8_t)r->kind;
 	float residual = (float)r->residual, error = (float)r->error;
 
-	return vec_append(&b->row_side, &r->side, 1, sizeof r->side, e) ||
-	       vec_append(&b->row_kind, &kind, 1, sizeof kind, e) ||
-	       vec_append(&b->row_samples, &r->samples, 1, sizeof r->samples, e) ||
-	       vec_append(&b->row_scale, &r->scale, 1, sizeof r->scale, e) ||
-	       vec_append(&b->row_residual, &residual, 1, sizeof residual, e) ||
-	       vec_append(&b->row_error, &error, 1, sizeof error, e) ||
-	       vec_append(&b->row_block, &blocks, 1, sizeof blocks, e) ? -1 : 0;
+	return mem_append(&b->row_side, &r->side, 1, sizeof r->side, e) ||
+	       mem_append(&b->row_kind, &kind, 1, sizeof kind, e) ||
+	       mem_append(&b->row_samples, &r->samples, 1, sizeof r->samples, e) ||
+	       mem_append(&b->row_scale, &r->scale, 1, sizeof r->scale, e) ||
+	       mem_append(&b->row_residual, &residual, 1, sizeof residual, e) ||
+	       mem_append(&b->row_error, &error, 1, sizeof error, e) ||
+	       mem_append(&b->row_block, &blocks, 1, sizeof blocks, e) ? -1 : 0;
 }
 
 /* ---- the numbers of the whole ---- */
@@ -92,11 +92,11 @@ static int map_chain(uint32_t *chain, const struct chains *local, struct vec *ma
 	const uint32_t none = CHAIN_NONE;
 
 	while (map->n < local->n)
-		if (vec_append(map, &none, 1, sizeof none, e))
+		if (mem_append(map, &none, 1, sizeof none, e))
 			return -1;
 	uint32_t *to = (uint32_t *)map->data + *chain;
 	if (*to == CHAIN_NONE)
-		*to = chains_find(whole, chains_count(local, *chain), e);
+		*to = bsdf_chains_find(whole, bsdf_chains_count(local, *chain), e);
 	*chain = *to;
 	return *to == CHAIN_NONE ? -1 : 0;
 }
@@ -131,8 +131,8 @@ static int sort_links(struct ff_batch *b, struct err *e)
 	return 0;
 }
 
-int batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *map,
-                   struct chains *whole, struct err *e)
+int ff_batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *map,
+                      struct chains *whole, struct err *e)
 {
 	for (size_t i = 0; i < b->block_chain.n; i++)
 		if (map_chain((uint32_t *)b->block_chain.data + i, local, map, whole, e))
@@ -143,30 +143,30 @@ int batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *m
 	return sort_links(b, e);
 }
 
-struct ff batch_view(const struct ff_batch *b)
+struct ff ff_batch_view(const struct ff_batch *b)
 {
 	struct ff f = {
-		.rows = b->row_side.n, .row_side = b->row_side.data,
-		.row_kind = b->row_kind.data, .row_samples = b->row_samples.data,
-		.row_scale = b->row_scale.data, .row_residual = b->row_residual.data,
-		.row_error = b->row_error.data, .row_block = b->row_block.data,
-		.blocks = b->block_chain.n, .block_chain = b->block_chain.data,
-		.block_start = b->block_start.data, .block_escape = b->escape.data,
-		.block_black = b->black.data, .block_lost = b->lost.data,
-		.block_cut = b->cut.data, .block_arrival = b->block_arrival.data,
+		.row.n = b->row_side.n, .row.side = b->row_side.data,
+		.row.kind = b->row_kind.data, .row.samples = b->row_samples.data,
+		.row.scale = b->row_scale.data, .row.residual = b->row_residual.data,
+		.row.error = b->row_error.data, .row.block = b->row_block.data,
+		.block.n = b->block_chain.n, .block.chain = b->block_chain.data,
+		.block.start = b->block_start.data, .block.escape = b->escape.data,
+		.block.black = b->black.data, .block.lost = b->lost.data,
+		.block.cut = b->cut.data, .block.arrival = b->block_arrival.data,
 		.entries = b->column.n, .column = b->column.data,
 		.value = b->f64 ? NULL : b->value.data, .value64 = b->f64 ? b->value.data : NULL,
-		.arrivals = b->arrival_target.n, .arrival_target = b->arrival_target.data,
-		.arrival_direction = b->arrival_direction.data,
-		.links = b->link_target.n, .link_target = b->link_target.data,
-		.link_source = b->link_source.data, .link_last = b->link_last.data,
-		.link_chain = b->link_chain.data,
-		.link_direction = b->link_direction.data, .link_row = b->link_row.data,
+		.arrival.n = b->arrival_target.n, .arrival.target = b->arrival_target.data,
+		.arrival.direction = b->arrival_direction.data,
+		.link.n = b->link_target.n, .link.target = b->link_target.data,
+		.link.source = b->link_source.data, .link.last = b->link_last.data,
+		.link.chain = b->link_chain.data,
+		.link.direction = b->link_direction.data, .link.row = b->link_row.data,
 	};
 	return f;
 }
 
-void batch_free(struct ff_batch *b)
+void ff_batch_free(struct ff_batch *b)
 {
 	struct vec *v[] = { &b->row_side, &b->row_kind, &b->row_samples, &b->row_scale,
 		&b->row_residual, &b->row_error, &b->row_block, &b->block_chain,

@@ -25,7 +25,7 @@ static void do_patches(void *arg, size_t begin, size_t end, int thread)
 	struct run *r = arg;
 
 	for (size_t i = begin; i < end; i++) {
-		uint32_t patch = r->first + (uint32_t)i, patches = (uint32_t)r->job->m->patches;
+		uint32_t patch = r->first + (uint32_t)i, patches = (uint32_t)r->job->m->patch.n;
 		r->owner[i] = thread;
 		if (patch >= patches)
 			ff_light_row(&r->thread[thread], patch - patches, &r->batch[i], &r->err[i]);
@@ -36,27 +36,27 @@ static void do_patches(void *arg, size_t begin, size_t end, int thread)
 	}
 }
 
-void ff_count(struct ff_stats *s, const struct ff *f)
+void ff_stats_count(struct ff_stats *s, const struct ff *f)
 {
-	for (size_t r = 0; r < f->rows; r++) {
+	for (size_t r = 0; r < f->row.n; r++) {
 		double cut = 0;
-		s->rows[f->row_kind[r]]++;
-		s->worst_residual = fmax(s->worst_residual, fabs((double)f->row_residual[r]));
-		for (uint64_t b = f->row_block[r]; b < f->row_block[r + 1]; b++)
-			cut += f->block_cut[b] * f->row_scale[r];
+		s->rows[f->row.kind[r]]++;
+		s->worst_residual = fmax(s->worst_residual, fabs((double)f->row.residual[r]));
+		for (uint64_t b = f->row.block[r]; b < f->row.block[r + 1]; b++)
+			cut += f->block.cut[b] * f->row.scale[r];
 		s->cut = fmax(s->cut, cut);
-		if (f->row_kind[r] == FF_DIFFUSE) {
-			s->samples += f->row_samples[r];
-			s->mean_error += (double)f->row_error[r];
-			s->worst_error = fmax(s->worst_error, (double)f->row_error[r]);
+		if (f->row.kind[r] == FF_DIFFUSE) {
+			s->samples += f->row.samples[r];
+			s->mean_error += (double)f->row.error[r];
+			s->worst_error = fmax(s->worst_error, (double)f->row.error[r]);
 		}
 	}
-	s->links += f->links;
-	s->blocks += f->blocks;
+	s->links += f->link.n;
+	s->blocks += f->block.n;
 	s->entries += f->entries;
 }
 
-void ff_count_pairs(struct ff_stats *s, const struct exchange_counts *c)
+void ff_stats_count_pairs(struct ff_stats *s, const struct exchange_counts *c)
 {
 	s->pairs[0] += c->clear;
 	s->pairs[1] += c->hidden;
@@ -77,13 +77,13 @@ static int emit(struct run *r, size_t n, struct chains *whole, struct ff_stats *
 		if (!bad && r->err[i].set)
 			bad = err_set(e, "%s", r->err[i].text);
 		if (!bad && b->row_side.n) {
-			bad = batch_renumber(b, &t->tally.chains, &t->chain_map, whole, e);
-			struct ff f = batch_view(b);
+			bad = ff_batch_renumber(b, &t->tally.chains, &t->chain_map, whole, e);
+			struct ff f = ff_batch_view(b);
 			if (!bad)
-				ff_count(stats, &f);
+				ff_stats_count(stats, &f);
 			bad = bad || sink->put(sink->arg, &f, e);
 		}
-		batch_free(b);
+		ff_batch_free(b);
 	}
 	return bad;
 }
@@ -106,13 +106,13 @@ static void report(void *arg, double done, double total)
 static int gather(struct ff_job *j, struct ff_stats *stats, const struct progress *progress,
                   struct err *e)
 {
-	struct part_progress pp = { progress, 0, 2. * (double)j->m->patches };
+	struct part_progress pp = { progress, 0, 2. * (double)j->m->patch.n };
 	struct progress inner = { report, &pp };
 
 	if (!j->o.gather || j->o.method == FF_HEMICUBE)
 		return 0;
-	return ff_gather(j, &stats->rays, &inner, e) ||
-	       (j->gather.rays && ff_share_rays(j, e)) ? -1 : 0;
+	return ff_reciprocal_cast(j, &stats->rays, &inner, e) ||
+	       (j->reciprocal.rays && ff_share_rays(j, e)) ? -1 : 0;
 }
 
 /* Patches [begin, end), or lights, numbered behind the patches. */
@@ -122,7 +122,7 @@ static int all_patches(struct run *r, uint32_t begin, uint32_t end, struct chain
 {
 	for (uint32_t p = begin; p < end; p += PATCHES_AT_A_TIME) {
 		size_t n = end - p < PATCHES_AT_A_TIME ? end - p : PATCHES_AT_A_TIME;
-		double before = r->job->gather.rays ? (double)r->job->m->patches : 0;
+		double before = r->job->reciprocal.rays ? (double)r->job->m->patch.n : 0;
 		struct part_progress pp = { progress, before + p - begin, before + end - begin };
 		struct progress inner = { report, &pp };
 		r->first = p;
@@ -144,10 +144,10 @@ static int all_lights(struct run *r, struct chains *whole, struct ff_stats *stat
 {
 	const struct ff_options *o = &r->job->o;
 	size_t lights = r->job->m->light.n;
-	uint32_t patches = (uint32_t)r->job->m->patches;
+	uint32_t patches = (uint32_t)r->job->m->patch.n;
 
-	return all_patches(r, patches + share(lights, o->part - 1, o->parts),
-	                   patches + share(lights, o->part, o->parts), whole, stats, sink, NULL, e);
+	return all_patches(r, patches + share(lights, o->shard - 1, o->shards),
+	                   patches + share(lights, o->shard, o->shards), whole, stats, sink, NULL, e);
 }
 
 /* ---- the chain table of the file ---- */
@@ -158,20 +158,20 @@ static int put_chains(struct ff *f, const struct chains *c, struct err *e)
 
 	for (uint32_t i = 0; i < c->n; i++)
 		for (uint32_t k = 0; k < c->events; k++)
-			events += chains_count(c, i)[k] > 0;
-	f->chains = c->n;
-	f->chain_start = mem_new(c->n + 1, sizeof *f->chain_start, "chains", e);
-	f->chain_event = mem_new(events, sizeof *f->chain_event, "chains", e);
-	f->chain_count = mem_new(events, sizeof *f->chain_count, "chains", e);
-	if (!f->chain_start || !f->chain_event || !f->chain_count)
+			events += bsdf_chains_count(c, i)[k] > 0;
+	f->chain.n = c->n;
+	f->chain.start = mem_new(c->n + 1, sizeof *f->chain.start, "chains", e);
+	f->chain.event = mem_new(events, sizeof *f->chain.event, "chains", e);
+	f->chain.count = mem_new(events, sizeof *f->chain.count, "chains", e);
+	if (!f->chain.start || !f->chain.event || !f->chain.count)
 		return -1;
 	for (uint32_t i = 0; i < c->n; i++) {
 		for (uint32_t k = 0; k < c->events; k++)
-			if (chains_count(c, i)[k]) {
-				f->chain_event[f->chain_events] = c->event[k];
-				f->chain_count[f->chain_events++] = chains_count(c, i)[k];
+			if (bsdf_chains_count(c, i)[k]) {
+				f->chain.event[f->chain.events] = c->event[k];
+				f->chain.count[f->chain.events++] = bsdf_chains_count(c, i)[k];
 			}
-		f->chain_start[i + 1] = f->chain_events;
+		f->chain.start[i + 1] = f->chain.events;
 	}
 	return 0;
 }
@@ -181,11 +181,11 @@ static void count_curved(const struct ff_job *j, struct ff_stats *s)
 {
 	const struct model *m = j->m;
 
-	for (uint32_t ps = 0; ps < 2 * m->patches; ps++) {
+	for (uint32_t ps = 0; ps < 2 * m->patch.n; ps++) {
 		if (!model_side_modelled(m, ps))
 			continue;
 		s->sides++;
-		s->curved += m->patch_loop[(ps >> 1) + 1] == m->patch_loop[ps >> 1];
+		s->curved += m->patch.loop[(ps >> 1) + 1] == m->patch.loop[ps >> 1];
 		s->directional |= j->is_ideal[ps] || j->has_lobe[ps] || j->shoots_lobe[ps];
 	}
 }
@@ -198,7 +198,7 @@ static int build_rows(struct ff_job *j, int patches, struct ff *whole, struct ff
 	int threads = j->o.threads > 0 ? j->o.threads : 1;
 	struct chains chains = { 0 };
 	struct run run = { .job = j };
-	int bad = ff_job_prepare(j, patches, e) || chains_init(&chains, j->m, j->chain_most, e);
+	int bad = ff_job_prepare(j, patches, e) || bsdf_chains_init(&chains, j->m, j->chain_most, e);
 
 	run.thread = mem_new((size_t)threads, sizeof *run.thread, "threads", e);
 	run.batch = mem_new(PATCHES_AT_A_TIME, sizeof *run.batch, "batches", e);
@@ -214,18 +214,18 @@ static int build_rows(struct ff_job *j, int patches, struct ff *whole, struct ff
 		      all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats, sink,
 		                  progress, e);
 	bad = bad || all_lights(&run, &chains, stats, sink, e) || put_chains(whole, &chains, e);
-	whole->chain_most = j->chain_most;
+	whole->chain.most = j->chain_most;
 	for (int t = 0; run.thread && t < threads; t++) {
 		stats->rays += run.thread[t].rays;
 		if (run.thread[t].formula)
-			ff_count_pairs(stats, &run.thread[t].formula->counts);
+			ff_stats_count_pairs(stats, &run.thread[t].formula->counts);
 		ff_thread_free(&run.thread[t]);
 	}
 	free(run.thread);
 	free(run.batch);
 	free(run.owner);
 	free(run.err);
-	chains_free(&chains);
+	bsdf_chains_free(&chains);
 	return bad ? -1 : 0;
 }
 
@@ -235,12 +235,12 @@ static int build_matrix(struct ff_job *j, struct ff *whole, struct ff_stats *sta
                         struct err *e)
 {
 	if (j->m->light.n)
-		return ff_matrix(j, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
+		return ff_exchange_matrix(j, whole->patch_begin, whole->patch_end, sink, stats, progress, e) ||
 		       build_rows(j, 0, whole, stats, sink, progress, e) ? -1 : 0;
-	whole->chains = whole->chain_most = 1;
-	whole->chain_start = mem_new(2, sizeof *whole->chain_start, "chains", e);
-	return whole->chain_start ? ff_matrix(j, whole->patch_begin, whole->patch_end, sink, stats,
-	                                      progress, e) : -1;
+	whole->chain.n = whole->chain.most = 1;
+	whole->chain.start = mem_new(2, sizeof *whole->chain.start, "chains", e);
+	return whole->chain.start ? ff_exchange_matrix(j, whole->patch_begin, whole->patch_end, sink, stats,
+	                                               progress, e) : -1;
 }
 
 int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole,
@@ -249,12 +249,12 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 {
 	struct ff_job job;
 	int bad = ff_job_init(&job, m, o, e);
-	int matrix = !bad && ff_by_formula(o) && o->to_patches && ff_matrix_can(&job);
+	int matrix = !bad && ff_by_formula(o) && o->to_patches && ff_exchange_matrix_can(&job);
 
 	*stats = (struct ff_stats){ 0 };
-	*whole = (struct ff){ .part = o->part, .parts = o->parts };
-	whole->patch_begin = share(m->patches, o->part - 1, o->parts);
-	whole->patch_end = share(m->patches, o->part, o->parts);
+	*whole = (struct ff){ .shard = o->shard, .shards = o->shards };
+	whole->patch_begin = share(m->patch.n, o->shard - 1, o->shards);
+	whole->patch_end = share(m->patch.n, o->shard, o->shards);
 	if (!bad && o->close && !matrix)
 		bad = err_set(e, "--close needs factors to patches by formula (-m auto --to patches) "
 		              "in a model without lobes, mirrors and panes");

@@ -25,7 +25,7 @@ struct ff_options {
 	int close;            /* formulas to patches: closed rows are made to add up */
 	int to_patches;       /* columns are patch-sides */
 	int f64;
-	uint32_t part, parts; /* 1-based shard */
+	uint32_t shard, shards; /* 1-based shard */
 	int threads;
 };
 

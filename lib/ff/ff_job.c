@@ -24,7 +24,7 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 	const struct materials *mt = &j->m->material;
 	uint32_t material = model_patch_material(j->m, ps >> 1);
 	int side = (int)(ps & 1), bands = mt->bands;
-	size_t here = material_at(mt, material, side), there = material_at(mt, material, !side);
+	size_t here = model_material_at(mt, material, side), there = model_material_at(mt, material, !side);
 	int emits = any(&mt->emission[here], bands);
 	int plain = mt->emission_exponent[2 * material + (uint32_t)side] == 1;
 
@@ -49,8 +49,8 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 
 static int job_arrays(struct ff_job *j, struct err *e)
 {
-	size_t sides = 2 * j->m->patches;
-	j->element = mem_new(j->m->elements, sizeof *j->element, "sampling tables", e);
+	size_t sides = 2 * j->m->patch.n;
+	j->element = mem_new(j->m->element.n, sizeof *j->element, "sampling tables", e);
 	j->shoots_diffuse = mem_new(sides, 1, "patch flags", e);
 	j->shoots_lobe = mem_new(sides, 1, "patch flags", e);
 	j->has_lobe = mem_new(sides, 1, "patch flags", e);
@@ -65,12 +65,12 @@ static int job_arrays(struct ff_job *j, struct err *e)
 /* A ray that lands on some sides has more to it than where it lands. */
 static int make_places(struct ff_job *j, struct err *e)
 {
-	uint8_t *apart = mem_new(2 * j->m->patches, 1, "patch flags", e);
+	uint8_t *apart = mem_new(2 * j->m->patch.n, 1, "patch flags", e);
 	int bad = !apart;
 
-	for (size_t ps = 0; !bad && ps < 2 * j->m->patches; ps++)
+	for (size_t ps = 0; !bad && ps < 2 * j->m->patch.n; ps++)
 		apart[ps] = j->is_black[ps] || j->is_ideal[ps] || j->has_lobe[ps];
-	bad = bad || tally_places_init(&j->places, j->m, apart, e);
+	bad = bad || ff_tally_places_init(&j->places, j->m, apart, e);
 	free(apart);
 	return bad ? -1 : 0;
 }
@@ -79,43 +79,43 @@ int ff_job_init(struct ff_job *j, const struct model *m, const struct ff_options
                 struct err *e)
 {
 	*j = (struct ff_job){ .m = m, .o = *o };
-	if (job_arrays(j, e) || locator_init(&j->locator, m, e) ||
+	if (job_arrays(j, e) || ray_locator_init(&j->locator, m, e) ||
 	    !(j->rays = ray_scene_new(m, e)))
 		return -1;
-	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
+	for (uint32_t ps = 0; ps < 2 * m->patch.n; ps++)
 		side_flags(j, ps);
 	ff_element_table(j);
-	return light_images_new(m, ray_offset(j->rays), 1, SIZE_MAX, 0, &j->images, e);
+	return ray_light_images_new(m, ray_offset(j->rays), 1, SIZE_MAX, 0, &j->images, e);
 }
 
 int ff_job_prepare(struct ff_job *j, int patches, struct err *e)
 {
 	int formula = patches && ff_by_formula(&j->o), cubes = patches && j->o.method == FF_HEMICUBE;
 
-	if (cubes && (hemi_grid_init(&j->grid, (int)j->o.rays, e) ||
-	              !(j->cubes = hemi_scene_new(j->m, e))))
+	if (cubes && (ff_hemicube_grid_init(&j->grid, (int)j->o.rays, e) ||
+	              !(j->cubes = ff_hemicube_scene_new(j->m, e))))
 		return -1;
 	if (formula && ff_formula_init(&j->formula, j->m, j->o.method == FF_ANALYTIC, e))
 		return -1;
-	return ff_points(j, e) || make_places(j, e) || ff_find_chain_most(j, e) ? -1 : 0;
+	return ff_sobol_points(j, e) || make_places(j, e) || ff_find_chain_limit(j, e) ? -1 : 0;
 }
 
 void ff_job_free(struct ff_job *j)
 {
 	void *array[] = { j->element, j->shoots_diffuse, j->shoots_lobe, j->has_lobe,
 		j->is_source, j->emits, j->is_ideal, j->is_black, j->of_rows.bits,
-		j->of_gathering.bits, j->of_small.bits, j->halvings };
+		j->of_reciprocal.bits, j->of_small.bits, j->halvings };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
-	light_images_free(&j->images);
-	locator_free(&j->locator);
-	tally_places_free(&j->places);
-	ff_gather_free(&j->gather);
+	ray_light_images_free(&j->images);
+	ray_locator_free(&j->locator);
+	ff_tally_places_free(&j->places);
+	ff_reciprocal_free(&j->reciprocal);
 	ff_formula_free(&j->formula);
 	ray_scene_free(j->rays);
-	hemi_scene_free(j->cubes);
-	hemi_grid_free(&j->grid);
+	ff_hemicube_scene_free(j->cubes);
+	ff_hemicube_grid_free(&j->grid);
 }
 
 int ff_thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e)
@@ -124,33 +124,33 @@ int ff_thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e)
 	                                    FORMULA_BODIES, 0 };
 
 	*t = (struct ff_thread){ .job = j };
-	if (tally_init(&t->tally, j->m, &j->places, j->has_lobe, j->chain_most, e))
+	if (ff_tally_init(&t->tally, j->m, &j->places, j->has_lobe, j->chain_most, e))
 		return -1;
 	t->tally.dependent = j->o.method == FF_HEMICUBE; /* pixels of a cube share its place */
 	if (j->formula.on) {
 		t->formula = mem_new(1, sizeof *t->formula, "formulas", e);
 		if (!t->formula)
 			return -1;
-		exchanger_init(t->formula, &o, &j->formula.bodies, j->rays, j->formula.centre);
+		occ_exchanger_init(t->formula, &o, &j->formula.bodies, j->rays, j->formula.centre);
 	}
 	if (j->o.method != FF_HEMICUBE)
 		return 0;
 	t->item = mem_new(2 * (size_t)j->o.points, j->grid.pixels * sizeof *t->item,
 	                  "hemicube items", e);
 	t->view = mem_new(2 * (size_t)j->o.points, sizeof *t->view, "hemicube views", e);
-	return t->item && t->view ? hemicube_init(&t->cube, &j->grid, e) : -1;
+	return t->item && t->view ? ff_hemicube_init(&t->cube, &j->grid, e) : -1;
 }
 
 void ff_thread_free(struct ff_thread *t)
 {
-	tally_free(&t->tally);
-	hemicube_free(&t->cube);
+	ff_tally_free(&t->tally);
+	ff_hemicube_free(&t->cube);
 	if (t->formula)
-		exchanger_free(t->formula);
+		occ_exchanger_free(t->formula);
 	free(t->formula);
-	free(t->captures.data);
+	free(t->incident.data);
 	free(t->pairs.data);
-	free(t->sights.data);
+	free(t->shares.data);
 	free(t->lit.data);
 	free(t->item);
 	free(t->view);

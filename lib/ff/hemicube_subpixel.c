@@ -39,32 +39,32 @@ static int share(struct ff_thread *t, uint32_t ps, uint32_t place, uint32_t end,
 	struct tally *y = &t->tally;
 	double sum = 0;
 
-	t->sights.n = 0;
+	t->shares.n = 0;
 	for (uint32_t at = place; at < end; at++) {
-		struct ff_sight s = { .column = y->places->column[at] };
-		s.w = t->job->m->element_area[s.column >> 1] * seen_of(t, ps, s.column);
+		struct ff_share s = { .column = y->places->column[at] };
+		s.w = t->job->m->element.area[s.column >> 1] * seen_of(t, ps, s.column);
 		sum += s.w;
-		if (vec_append(&t->sights, &s, 1, sizeof s, &y->err))
+		if (mem_append(&t->shares, &s, 1, sizeof s, &y->err))
 			return -1;
 	}
-	const struct ff_sight *s = t->sights.data;
+	const struct ff_share *s = t->shares.data;
 	for (uint32_t at = place; sum > 0 && at < end; at++)
 		if (s[at - place].w > 0 || y->dense[at] > 0)
-			tally_set(y, at, light * s[at - place].w / sum, 0);
+			ff_tally_set(y, at, light * s[at - place].w / sum, 0);
 	return 0;
 }
 
-void ff_share_pixels(struct ff_thread *t, uint32_t ps)
+void ff_hemicube_subpixel(struct ff_thread *t, uint32_t ps)
 {
 	const struct ff_job *j = t->job;
 	double pixels = (double)j->grid.pixels * j->o.points;
 
-	for (uint32_t at = tally_next(&t->tally, 0), end; at != UINT32_MAX;
-	     at = tally_next(&t->tally, end)) {
-		uint32_t target = tally_side_at(&t->tally, at), p = target >> 1;
-		uint32_t elements = j->m->patch_start[p + 1] - j->m->patch_start[p];
+	for (uint32_t at = ff_tally_next(&t->tally, 0), end; at != UINT32_MAX;
+	     at = ff_tally_next(&t->tally, end)) {
+		uint32_t target = ff_tally_side_at(&t->tally, at), p = target >> 1;
+		uint32_t elements = j->m->patch.start[p + 1] - j->m->patch.start[p];
 		double light = 0;
-		end = tally_side_end(&t->tally, target);
+		end = ff_tally_side_end(&t->tally, target);
 		for (uint32_t i = end - elements; i < end; i++)
 			light += t->tally.dense[i];
 		if (elements > 1 && light * pixels < ENOUGH * (double)elements &&

@@ -11,13 +11,13 @@
  * met one, times their areas. */
 static void direct_light(const struct ff_job *j, double *flux)
 {
-	const struct ff_gather *g = &j->gather;
+	const struct ff_reciprocal *g = &j->reciprocal;
 
-	for (uint32_t source = 0; source < 2 * j->m->patches; source++)
+	for (uint32_t source = 0; source < 2 * j->m->patch.n; source++)
 		for (uint64_t i = g->start[source]; j->emits[source] && i < g->start[source + 1]; i++) {
-			const struct ff_gathered *s = &g->seen[i];
-			uint32_t el = s->column >> 1, ps = 2 * j->m->element_patch[el] + (s->column & 1);
-			flux[ps] += j->m->element_area[el] * s->count / ff_gather_rays(j, el);
+			const struct ff_receiver_hits *s = &g->seen[i];
+			uint32_t el = s->column >> 1, ps = 2 * j->m->element.patch[el] + (s->column & 1);
+			flux[ps] += j->m->element.area[el] * s->count / ff_reciprocal_rays(j, el);
 		}
 }
 
@@ -37,7 +37,7 @@ int ff_most_halvings(uint32_t rays)
 
 int ff_share_rays(struct ff_job *j, struct err *e)
 {
-	size_t sides = 2 * j->m->patches, rows = 0;
+	size_t sides = 2 * j->m->patch.n, rows = 0;
 	double *flux, area = 0, all = 0, sum = 0;
 	int most = ff_most_halvings(j->o.rays);
 
@@ -51,12 +51,12 @@ int ff_share_rays(struct ff_job *j, struct err *e)
 	}
 	direct_light(j, flux);
 	for (uint32_t ps = 0; ps < sides; ps++) {
-		area += j->is_black[ps] ? 0 : j->m->patch_area[ps >> 1];
+		area += j->is_black[ps] ? 0 : j->m->patch.area[ps >> 1];
 		all += flux[ps];
 	}
 	/* Light that came by way of other surfaces is taken to be as much, and even. */
 	for (uint32_t ps = 0; all > 0 && ps < sides; ps++) {
-		flux[ps] += j->m->patch_area[ps >> 1] * all / area;
+		flux[ps] += j->m->patch.area[ps >> 1] * all / area;
 		sum += is_plain(j, ps) ? flux[ps] : 0;
 		rows += (size_t)is_plain(j, ps);
 	}

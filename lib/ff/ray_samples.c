@@ -26,16 +26,16 @@ static void fill_element(const struct ff_job *j, uint32_t i)
 {
 	const struct model *m = j->m;
 	struct ff_element *el = &j->element[i];
-	const uint32_t *c = &m->element[3 * (size_t)i];
+	const uint32_t *c = &m->element.corner[3 * (size_t)i];
 	const double *a = &m->vertex[3 * (size_t)c[0]];
-	const double *normal = &m->element_normal[3 * (size_t)i];
-	double inset = ray_inset(j->rays, m->element_area[i]);
+	const double *normal = &m->element.normal[3 * (size_t)i];
+	double inset = ray_inset(j->rays, m->element.area[i]);
 	double tangent[2][3];
 
 	v3_frame(normal, tangent[0], tangent[1]);
 	for (int k = 0; k < 2; k++)
 		v3_sub(&m->vertex[3 * (size_t)c[k + 1]], a, el->edge[k]);
-	el->size = fmax(sqrt(m->element_area[i]), reach(el->edge[0], el->edge[1]));
+	el->size = fmax(sqrt(m->element.area[i]), reach(el->edge[0], el->edge[1]));
 	for (int k = 0; k < 3; k++) {
 		el->corner[k] = a[k] + inset / 3 * (el->edge[0][k] + el->edge[1][k]);
 		el->edge[0][k] *= 1 - inset;
@@ -50,15 +50,15 @@ void ff_element_table(struct ff_job *j)
 {
 	const struct model *m = j->m;
 
-	for (size_t p = 0; p < m->patches; p++) {
-		double sum = 0, scale = 0x1p32 / m->patch_area[p];
-		for (uint32_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++) {
+	for (size_t p = 0; p < m->patch.n; p++) {
+		double sum = 0, scale = 0x1p32 / m->patch.area[p];
+		for (uint32_t i = m->patch.start[p]; i < m->patch.start[p + 1]; i++) {
 			struct ff_element *el = &j->element[i];
 			fill_element(j, i);
 			el->before = (uint32_t)fmin(0xffffffffu, sum * scale);
-			el->per_part = (float)(1 / (m->element_area[i] * scale));
-			el->cdf = sum += m->element_area[i];
-			el->per_area = 1 / m->element_area[i];
+			el->per_part = (float)(1 / (m->element.area[i] * scale));
+			el->cdf = sum += m->element.area[i];
+			el->per_area = 1 / m->element.area[i];
 		}
 	}
 }
@@ -68,14 +68,14 @@ void ff_normal(const struct ff_job *j, uint32_t element, int side, double n[3])
 	double s = side ? -1 : 1;
 
 	for (int k = 0; k < 3; k++)
-		n[k] = s * j->m->element_normal[3 * (size_t)element + (size_t)k];
+		n[k] = s * j->m->element.normal[3 * (size_t)element + (size_t)k];
 }
 
 /* Binary search without branches to mispredict. */
 uint32_t ff_choose(const struct ff_job *j, uint32_t patch, double *u)
 {
-	uint32_t first = j->m->patch_start[patch], lo = first;
-	uint32_t n = j->m->patch_start[patch + 1] - first;
+	uint32_t first = j->m->patch.start[patch], lo = first;
+	uint32_t n = j->m->patch.start[patch + 1] - first;
 	double area = *u * j->element[first + n - 1].cdf;
 
 	while (n > 1) {
@@ -99,8 +99,8 @@ uint32_t ff_point(const struct ff_job *j, uint32_t patch, double u0, double u1, 
 	return i;
 }
 
-void ff_batch_numbers(const struct ff_samples *s, const uint32_t seed[4], uint32_t first,
-                      uint32_t n, struct ff_batch_rays *b)
+void ff_rays_numbers(const struct ff_samples *s, const uint32_t seed[4], uint32_t first,
+                     uint32_t n, struct ff_ray_batch *b)
 {
 	uint32_t bits[RAY_BATCH] = { 0 };
 
@@ -122,7 +122,7 @@ void ff_batch_numbers(const struct ff_samples *s, const uint32_t seed[4], uint32
 
 /* The last element whose share begins at or before the number: for few elements by
  * counting, all rays at once; for many by binary search. */
-static void count_choices(const struct ff_element *el, uint32_t elements, struct ff_batch_rays *b)
+static void count_choices(const struct ff_element *el, uint32_t elements, struct ff_ray_batch *b)
 {
 	for (int i = 0; i < RAY_BATCH; i++)
 		b->element[i] = 0;
@@ -134,7 +134,7 @@ static void count_choices(const struct ff_element *el, uint32_t elements, struct
 }
 
 static void search_choices(const struct ff_element *el, uint32_t elements, uint32_t n,
-                           struct ff_batch_rays *b)
+                           struct ff_ray_batch *b)
 {
 	for (uint32_t i = 0; i < n; i++) {
 		uint32_t lo = 0, left = elements;
@@ -147,11 +147,11 @@ static void search_choices(const struct ff_element *el, uint32_t elements, uint3
 	}
 }
 
-void ff_batch_elements(const struct ff_job *j, uint32_t patch, uint32_t n,
-                       struct ff_batch_rays *b)
+void ff_rays_elements(const struct ff_job *j, uint32_t patch, uint32_t n,
+                      struct ff_ray_batch *b)
 {
 	enum { FEW = 24 };
-	uint32_t first = j->m->patch_start[patch], elements = j->m->patch_start[patch + 1] - first;
+	uint32_t first = j->m->patch.start[patch], elements = j->m->patch.start[patch + 1] - first;
 	const struct ff_element *el = &j->element[first];
 
 	if (elements <= FEW)
@@ -170,7 +170,7 @@ void ff_batch_elements(const struct ff_job *j, uint32_t patch, uint32_t n,
 typedef double d4 __attribute__((vector_size(32), aligned(8), may_alias));
 typedef float f4 __attribute__((vector_size(16), aligned(4), may_alias));
 
-void ff_batch_origins(const struct ff_job *j, int side, uint32_t n, struct ff_batch_rays *b)
+void ff_rays_origins(const struct ff_job *j, int side, uint32_t n, struct ff_ray_batch *b)
 {
 	struct ray_units units = ray_units(j->rays);
 	double off = ray_offset(j->rays) * (side ? -1 : 1);
@@ -207,7 +207,7 @@ static void turns(const float *u, float *x, float *y)
 	}
 }
 
-void ff_batch_directions(const struct ff_job *j, int side, uint32_t n, struct ff_batch_rays *b)
+void ff_rays_directions(const struct ff_job *j, int side, uint32_t n, struct ff_ray_batch *b)
 {
 	float x[RAY_BATCH], y[RAY_BATCH], z[RAY_BATCH], sign = side ? -1 : 1;
 

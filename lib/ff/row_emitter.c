@@ -58,20 +58,20 @@ struct outlook {
  * behind the element. */
 static struct outlook look(const struct ff_job *j, uint32_t source, uint32_t column, uint32_t rays)
 {
-	const double *c = j->gather.centre[source >> 1];
-	double x[3], d[3], nx[3], ny[3], area = j->m->element_area[column >> 1];
+	const double *c = j->reciprocal.centre[source >> 1];
+	double x[3], d[3], nx[3], ny[3], area = j->m->element.area[column >> 1];
 	double size = c[3] + j->element[column >> 1].size;
 
 	point_on(&j->element[column >> 1], 4. / 9, .5, x);
 	ff_normal(j, column >> 1, (int)(column & 1), nx);
-	ff_normal(j, j->m->patch_start[source >> 1], (int)(source & 1), ny);
+	ff_normal(j, j->m->patch.start[source >> 1], (int)(source & 1), ny);
 	v3_sub(c, x, d);
 	double r2 = v3_dot(d, d), cx = v3_dot(d, nx), cy = -v3_dot(d, ny);
 	if (cx < -c[3])
 		return (struct outlook){ 0 };
 	double s2 = fmax(r2, .25 * size * size);
 	double f = fmax(fmax(0, cx) * fmax(0, cy) / s2, .02) / (PI * s2);
-	return (struct outlook){ rays * area * f, j->m->patch_area[source >> 1] * f,
+	return (struct outlook){ rays * area * f, j->m->patch.area[source >> 1] * f,
 	                         r2 < 2 * size * size };
 }
 
@@ -80,7 +80,7 @@ static int above(const struct model *m, uint32_t first, uint32_t end, const doub
 {
 	for (size_t i = 3 * (size_t)first; i < 3 * (size_t)end; i++) {
 		double d[3];
-		v3_sub(&m->vertex[3 * (size_t)m->element[i]], x, d);
+		v3_sub(&m->vertex[3 * (size_t)m->element.corner[i]], x, d);
 		if (v3_dot(d, n) > 1e-9 * v3_length(d))
 			return 1;
 	}
@@ -92,15 +92,15 @@ static int above(const struct model *m, uint32_t first, uint32_t end, const doub
 static int faces(const struct ff_job *j, uint32_t source, uint32_t column)
 {
 	const struct model *m = j->m;
-	const uint32_t *start = &m->patch_start[source >> 1], el = column >> 1;
-	int plane = m->patch_loop[(source >> 1) + 1] > m->patch_loop[source >> 1];
+	const uint32_t *start = &m->patch.start[source >> 1], el = column >> 1;
+	int plane = m->patch.loop[(source >> 1) + 1] > m->patch.loop[source >> 1];
 	double n[3];
 
 	ff_normal(j, el, (int)(column & 1), n);
-	if (!above(m, start[0], start[1], &m->vertex[3 * (size_t)m->element[3 * (size_t)el]], n))
+	if (!above(m, start[0], start[1], &m->vertex[3 * (size_t)m->element.corner[3 * (size_t)el]], n))
 		return 0;
 	ff_normal(j, start[0], (int)(source & 1), n);
-	return !plane || above(m, el, el + 1, j->gather.centre[source >> 1], n);
+	return !plane || above(m, el, el + 1, j->reciprocal.centre[source >> 1], n);
 }
 
 static uint64_t pair_seed(const struct ff_job *j, uint32_t stream, uint32_t source, uint32_t column)
@@ -109,25 +109,25 @@ static uint64_t pair_seed(const struct ff_job *j, uint32_t stream, uint32_t sour
 }
 
 /* F[source -> element-side] by rays of the element. */
-static struct ff_sight by_rays(struct ff_thread *t, uint32_t source, uint32_t column)
+static struct ff_share by_rays(struct ff_thread *t, uint32_t source, uint32_t column)
 {
 	const struct ff_job *j = t->job;
 	uint64_t seed = pair_seed(j, 4, source, column);
 	uint32_t seeds[FF_DIMS], hits = 0;
-	struct ff_batch_rays b;
+	struct ff_ray_batch b;
 
 	for (int d = 0; d < FF_DIMS; d++)
 		seeds[d] = rng_sobol_seed(seed, d);
 	for (uint32_t first = 0; first < FF_CLOSE_RAYS; first += RAY_BATCH) {
-		ff_batch_from_element(j, &j->of_rows, seeds, column, first, RAY_BATCH, &b);
+		ff_rays_from_element(j, &j->of_rows, seeds, column, first, RAY_BATCH, &b);
 		for (int i = 0; i < RAY_BATCH; i++)
 			hits += b.ray.triangle[i] != RAY_MISS && b.ray.side[i] == (source & 1) &&
-			        j->m->element_patch[b.hit[i]] == source >> 1;
+			        j->m->element.patch[b.hit[i]] == source >> 1;
 	}
 	t->rays += FF_CLOSE_RAYS;
 	double f = (double)hits / FF_CLOSE_RAYS;
-	double scale = j->m->element_area[column >> 1] / j->m->patch_area[source >> 1];
-	return (struct ff_sight){ column, scale * f, scale * scale * f * (1 - f) / FF_CLOSE_RAYS };
+	double scale = j->m->element.area[column >> 1] / j->m->patch.area[source >> 1];
+	return (struct ff_share){ column, scale * f, scale * scale * f * (1 - f) / FF_CLOSE_RAYS };
 }
 
 /* A pair of points, moved off their surfaces, and its weight. */
@@ -167,9 +167,9 @@ static double draw_direction(const struct ff_job *j, uint32_t source, uint32_t c
 		corner[3 + c] = to->corner[c] + to->edge[0][c];
 		corner[6 + c] = to->corner[c] + to->edge[1][c];
 	}
-	double height = v3_dot(off, ny), angle = height > 0 ? triangle_angle(corner, x) : 0;
+	double height = v3_dot(off, ny), angle = height > 0 ? geo_solid_angle(corner, x) : 0;
 	if (angle > tiny) {
-		triangle_direction(corner, x, angle, u, dir);
+		geo_solid_angle_sample(corner, x, angle, u, dir);
 		double fall = -v3_dot(dir, ny);
 		k = fall > 0 ? fmax(0, v3_dot(dir, nx)) * angle * to->per_area / PI : 0;
 		memcpy(y, x, sizeof ny);
@@ -187,11 +187,11 @@ typedef double draw_fn(const struct ff_job *j, uint32_t source, uint32_t column,
                        uint64_t seed, double x[3], double y[3]);
 
 /* F[source -> element-side] by n pairs of points. */
-static struct ff_sight by_pairs(struct ff_thread *t, uint32_t source, uint32_t column,
+static struct ff_share by_pairs(struct ff_thread *t, uint32_t source, uint32_t column,
                                 uint32_t n, draw_fn *draw)
 {
 	const struct ff_job *j = t->job;
-	double area = j->m->element_area[column >> 1], sum = 0, squares = 0, x[3], y[3];
+	double area = j->m->element.area[column >> 1], sum = 0, squares = 0, x[3], y[3];
 	uint64_t seed = pair_seed(j, 2, source, column);
 
 	for (uint32_t i = 0; i < n; i++) {
@@ -205,7 +205,7 @@ static struct ff_sight by_pairs(struct ff_thread *t, uint32_t source, uint32_t c
 		squares += k * k;
 	}
 	double mean = sum / n, spread = n > 1 ? squares / n - mean * mean : mean * mean;
-	return (struct ff_sight){ column, area * mean,
+	return (struct ff_share){ column, area * mean,
 	                          area * area * fmax(0, spread) / (n > 1 ? n - 1 : 1) };
 }
 
@@ -217,14 +217,14 @@ static double unhidden(const struct ff_job *j, uint32_t source, uint32_t column)
 
 	for (uint32_t i = 0; i < PILOT_PAIRS; i++)
 		sum += draw_direction(j, source, column, i, seed, x, y);
-	return j->m->patch_area[source >> 1] * sum / PILOT_PAIRS;
+	return j->m->patch.area[source >> 1] * sum / PILOT_PAIRS;
 }
 
 /* An element-side close to the source. */
-static struct ff_sight see_close(struct ff_thread *t, uint32_t source, uint32_t column)
+static struct ff_share see_close(struct ff_thread *t, uint32_t source, uint32_t column)
 {
 	if (!faces(t->job, source, column))
-		return (struct ff_sight){ 0 };
+		return (struct ff_share){ 0 };
 	return unhidden(t->job, source, column) > plenty
 	       ? by_rays(t, source, column)
 	       : by_pairs(t, source, column, MOST_PAIRS, draw_direction);
@@ -232,11 +232,11 @@ static struct ff_sight see_close(struct ff_thread *t, uint32_t source, uint32_t 
 
 /* An element-side's sight of the source, to be trusted as far as `rays` rays of the row;
  * weight 0 if there is none. */
-static struct ff_sight sight(struct ff_thread *t, uint32_t source, uint32_t column,
-                             uint32_t rays, struct rng *chance)
+static struct ff_share element_share(struct ff_thread *t, uint32_t source, uint32_t column,
+                                     uint32_t rays, struct rng *chance)
 {
 	struct outlook o = look(t->job, source, column, rays);
-	struct ff_sight s = { column, 0, 0 };
+	struct ff_share s = { column, 0, 0 };
 	double odds = fmin(1, o.want / faint), e, off;
 	uint32_t n = 1;
 
@@ -244,8 +244,8 @@ static struct ff_sight sight(struct ff_thread *t, uint32_t source, uint32_t colu
 	    ff_formula_has(&t->job->formula, source) &&
 	    ff_formula_exchange(t->formula, &t->job->formula, source, column, &e, &off,
 	                        &t->tally.err)) {
-		double area = t->job->m->patch_area[source >> 1];
-		return (struct ff_sight){ column, e / area, off / area * (off / area) };
+		double area = t->job->m->patch.area[source >> 1];
+		return (struct ff_share){ column, e / area, off / area * (off / area) };
 	}
 	if (o.close)
 		return see_close(t, source, column);
@@ -259,21 +259,21 @@ static struct ff_sight sight(struct ff_thread *t, uint32_t source, uint32_t colu
 	return s;
 }
 
-double ff_see(struct ff_thread *t, uint32_t source, uint32_t rays, struct err *e)
+double ff_emitter_row(struct ff_thread *t, uint32_t source, uint32_t rays, struct err *e)
 {
 	const struct ff_job *j = t->job;
 	struct rng chance = rng_seed(j->o.seed + 3, source);
 	double sum = 0;
 
-	t->sights.n = 0;
-	for (uint32_t ps = 0; ps < 2 * j->m->patches; ps++) {
-		const uint32_t *start = &j->m->patch_start[ps >> 1];
+	t->shares.n = 0;
+	for (uint32_t ps = 0; ps < 2 * j->m->patch.n; ps++) {
+		const uint32_t *start = &j->m->patch.start[ps >> 1];
 		if (j->is_black[ps] || j->is_ideal[ps])
 			continue;
 		for (uint32_t el = start[0]; el < start[1]; el++) {
-			struct ff_sight s = sight(t, source, 2 * el + (ps & 1), rays, &chance);
+			struct ff_share s = element_share(t, source, 2 * el + (ps & 1), rays, &chance);
 			sum += s.w;
-			if (s.w > 0 && vec_append(&t->sights, &s, 1, sizeof s, e))
+			if (s.w > 0 && mem_append(&t->shares, &s, 1, sizeof s, e))
 				return 0;
 		}
 	}

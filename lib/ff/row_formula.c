@@ -4,17 +4,17 @@ int ff_formula_init(struct ff_formula *f, const struct model *m, int all, struct
 {
 	f->on = 1;
 	f->all = all;
-	facet_centre(m, f->centre);
-	return facet_set_init(&f->sources, m, FACETS_OF_PATCHES, e) ||
-	       facet_set_init(&f->receivers, m, FACETS_OF_ELEMENTS, e) ||
-	       body_set_init(&f->bodies, m, e) ? -1 : 0;
+	occ_facet_centre(m, f->centre);
+	return occ_facet_set_init(&f->sources, m, FACETS_OF_PATCHES, e) ||
+	       occ_facet_set_init(&f->receivers, m, FACETS_OF_ELEMENTS, e) ||
+	       occ_occluder_set_init(&f->bodies, m, e) ? -1 : 0;
 }
 
 void ff_formula_free(struct ff_formula *f)
 {
-	facet_set_free(&f->sources);
-	facet_set_free(&f->receivers);
-	body_set_free(&f->bodies);
+	occ_facet_set_free(&f->sources);
+	occ_facet_set_free(&f->receivers);
+	occ_occluder_set_free(&f->bodies);
 	*f = (struct ff_formula){ 0 };
 }
 
@@ -26,7 +26,7 @@ int ff_formula_exchange(struct exchanger *x, const struct ff_formula *f, uint32_
 	*area = *error = 0;
 	for (uint32_t i = f->sources.start[source]; i < f->sources.start[source + 1]; i++)
 		for (uint32_t j = f->receivers.start[column]; j < f->receivers.start[column + 1]; j++) {
-			*area += exchange(x, &f->sources, i, &f->receivers, j, &off, e);
+			*area += occ_exchange(x, &f->sources, i, &f->receivers, j, &off, e);
 			*error += off;
 		}
 	return x->counts.crowded == crowded;

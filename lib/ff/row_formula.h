@@ -1,4 +1,4 @@
-/* Factors from plane patch-sides to element-sides by formula (private to lib/ff_*.c). */
+/* Factors from plane patch-sides to element-sides by formula (private to lib/ff). */
 #ifndef TWOPASS_ROW_FORMULA_H
 #define TWOPASS_ROW_FORMULA_H
 
@@ -8,7 +8,7 @@ struct ff_formula {
 	int on;                   /* anything is computed by formula */
 	int all;                  /* of all plane patch-sides, not only of emitters */
 	struct facet_set sources, receivers; /* patch-sides, element-sides */
-	struct body_set bodies;
+	struct occluder_set bodies;
 	double centre[3];
 };
 

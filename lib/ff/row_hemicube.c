@@ -47,7 +47,7 @@ static void render(struct ff_thread *t, uint32_t patch, int side)
 	for (uint32_t i = 0; i < j->o.points; i++) {
 		const struct view *v = &t->view[2 * i + (uint32_t)side];
 		place_view(t, patch, i, side);
-		hemicube_render(&t->cube, j->cubes, v->eye, v->frame, HEMI_VOID);
+		ff_hemicube_render(&t->cube, j->cubes, v->eye, v->frame, HEMICUBE_VOID);
 		memcpy(items(t, i, side), t->cube.item, j->grid.pixels * sizeof *t->item);
 	}
 }
@@ -65,17 +65,17 @@ static void through_pixel(struct ff_thread *t, const struct view *v, uint32_t it
 {
 	const struct ff_job *j = t->job;
 
-	if (item == HEMI_VOID) {
-		tally_rest(&t->tally, 0)->escape += w;
+	if (item == HEMICUBE_VOID) {
+		ff_tally_rest(&t->tally, 0)->escape += w;
 		return;
 	}
-	uint32_t ps = 2 * j->m->element_patch[item >> 1] + (item & 1);
+	uint32_t ps = 2 * j->m->element.patch[item >> 1] + (item & 1);
 	if (j->is_ideal[ps] || (j->has_lobe[ps] && t->lobe_depth))
 		ff_follow(t, v->eye, dir, w, 0);
 	else if (!model_side_modelled(j->m, ps))
-		tally_rest(&t->tally, 0)->black += w;
+		ff_tally_rest(&t->tally, 0)->black += w;
 	else
-		tally_hit(&t->tally, 0, item, w, dir);
+		ff_tally_hit(&t->tally, 0, item, w, dir);
 }
 
 /* Counts how often a running sum of weights passes a multiple of 1 / parts. */
@@ -108,15 +108,15 @@ static void fly_on(struct ff_thread *t, const struct view *v, int has_lobe,
 }
 
 /* Keeps every CAPTURES-th part of the cosine-weighted hemisphere as a light path. */
-static void capture_pixel(struct ff_thread *t, uint32_t ps, const struct capture *now, double w,
+static void capture_pixel(struct ff_thread *t, uint32_t ps, const struct ff_incident *now, double w,
                           struct gathering *g)
 {
-	struct capture c = *now;
+	struct ff_incident c = *now;
 
 	c.source = ps;
 	c.w = passes(&g->captured, w, CAPTURES);
 	if (c.w > 0 && t->job->is_source[ps])
-		vec_append(&t->captures, &c, 1, sizeof c, &t->tally.err);
+		mem_append(&t->incident, &c, 1, sizeof c, &t->tally.err);
 }
 
 static void gather_pixel(struct ff_thread *t, uint32_t i, uint32_t from, size_t pixel, double w,
@@ -125,22 +125,22 @@ static void gather_pixel(struct ff_thread *t, uint32_t i, uint32_t from, size_t 
 	const struct ff_job *j = t->job;
 	const struct view *v = &t->view[2 * i + (from & 1)];
 	uint32_t item = items(t, i, (int)(from & 1))[pixel];
-	uint32_t ps = item == HEMI_VOID ? 0 : 2 * j->m->element_patch[item >> 1] + (item & 1);
+	uint32_t ps = item == HEMICUBE_VOID ? 0 : 2 * j->m->element.patch[item >> 1] + (item & 1);
 	double dir[3];
 
 	to_world(v, &j->grid.direction[3 * pixel], dir);
-	if (item == HEMI_VOID) {
-		tally_rest(&t->tally, 0)->escape += w;
+	if (item == HEMICUBE_VOID) {
+		ff_tally_rest(&t->tally, 0)->escape += w;
 		return;
 	}
 	if (j->is_black[ps]) {
-		tally_rest(&t->tally, 0)->black += w;
+		ff_tally_rest(&t->tally, 0)->black += w;
 		return;
 	}
-	tally_hit(&t->tally, 0, item, w, dir);
+	ff_tally_hit(&t->tally, 0, item, w, dir);
 	if (!j->is_ideal[ps] && !j->has_lobe[from])
 		return;
-	t->now = (struct capture){ .element = v->element, .view = i };
+	t->now = (struct ff_incident){ .element = v->element, .view = i };
 	memcpy(t->now.x, v->eye, sizeof t->now.x);
 	memcpy(t->now.l, dir, sizeof t->now.l);
 	if (j->is_ideal[ps])
@@ -159,7 +159,7 @@ static void gather(struct ff_thread *t, uint32_t ps)
 		for (size_t k = 0; k < j->grid.pixels; k++)
 			gather_pixel(t, i, ps, k, share * j->grid.delta[k], &g);
 		if ((i + 1) * GROUPS % j->o.points == 0)
-			tally_replicate(&t->tally);
+			ff_tally_replicate(&t->tally);
 	}
 }
 
@@ -171,10 +171,10 @@ static void cast_view(struct ff_thread *t, uint32_t i, int side, const double di
 
 	for (int k = 0; k < 3; k++)
 		local[k] = v3_dot(dir, v->frame[k]);
-	through_pixel(t, v, items(t, i, side)[hemicube_lookup(&t->job->grid, local)], dir, w);
+	through_pixel(t, v, items(t, i, side)[ff_hemicube_lookup(&t->job->grid, local)], dir, w);
 }
 
-static void cast_lookup(struct ff_thread *t, const struct capture *c, int side,
+static void cast_lookup(struct ff_thread *t, const struct ff_incident *c, int side,
                         const double dir[3], double w)
 {
 	cast_view(t, c->view, side, dir, w);
@@ -194,11 +194,11 @@ static void gather_emission(struct ff_thread *t, uint32_t ps, double exponent)
 		for (uint32_t k = 0; k < n; k++) {
 			double u[2] = { rng_sobol(i * n + k, 0, seed), rng_sobol(i * n + k, 1, seed) };
 			double dir[3];
-			lobe_sample(exponent, normal, normal, u, dir);
+			bsdf_lobe_sample(exponent, normal, normal, u, dir);
 			cast_view(t, i, side, dir, w);
 		}
 		if ((i + 1) * GROUPS % j->o.points == 0)
-			tally_replicate(&t->tally);
+			ff_tally_replicate(&t->tally);
 	}
 	t->lobe_depth = 0;
 }
@@ -210,23 +210,23 @@ static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struc
 	uint32_t samples = (uint32_t)(j->grid.pixels * j->o.points);
 
 	t->rng = rng_seed(j->o.seed, ps);
-	t->captures.n = 0;
+	t->incident.n = 0;
 	if (j->shoots_diffuse[ps] || j->has_lobe[ps]) {
 		struct ff_batch unused = { 0 };
 		gather(t, ps);
 		if (j->emits[ps])
-			ff_share_pixels(t, ps);
-		if (tally_finish(&t->tally, j->shoots_diffuse[ps] ? b : &unused, ps, FF_DIFFUSE,
-		                 samples, 1, e))
+			ff_hemicube_subpixel(t, ps);
+		if (ff_tally_finish(&t->tally, j->shoots_diffuse[ps] ? b : &unused, ps, FF_DIFFUSE,
+		                    samples, 1, e))
 			return -1;
-		batch_free(&unused);
+		ff_batch_free(&unused);
 	}
 	if (j->shoots_lobe[ps]) {
 		gather_emission(t, ps, j->m->material.emission_exponent[2 * material + (ps & 1)]);
-		if (tally_finish(&t->tally, b, ps, FF_EMISSION, EMISSION_SAMPLES, 1, e))
+		if (ff_tally_finish(&t->tally, b, ps, FF_EMISSION, EMISSION_SAMPLES, 1, e))
 			return -1;
 	}
-	return j->has_lobe[ps] ? ff_links(t, ps, cast_lookup, b, e) : 0;
+	return j->has_lobe[ps] ? ff_directional_rows(t, ps, cast_lookup, b, e) : 0;
 }
 
 int ff_patch_hemicube(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e)

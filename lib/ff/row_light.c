@@ -58,7 +58,7 @@ static void see_by(struct ff_thread *t, struct look *k, uint32_t chain, double w
 
 	while (i < t->lit.n && lit[i].chain != chain)
 		i++;
-	if (i == t->lit.n && vec_append(&t->lit, &new, 1, sizeof new, &t->tally.err))
+	if (i == t->lit.n && mem_append(&t->lit, &new, 1, sizeof new, &t->tally.err))
 		return;
 	lit = (struct lit *)t->lit.data + i;
 	lit->value += w;
@@ -71,15 +71,15 @@ static void look_from(struct ff_thread *t, struct look *k, const double x[3])
 	struct light_sight s;
 	uint32_t chain = CHAIN_NONE;
 
-	light_see(k->l, k->light, x, k->clear, &s);
+	model_light_see(k->l, k->light, x, k->clear, &s);
 	double all = fmax(0, v3_dot(k->normal, s.toward)) * s.across, w = all * s.falloff;
 	k->points++;
 	k->all += all;
 	k->squares[0] += all * all;
 	if (w > 0) {
 		ray_leave(t->job->rays, k->normal, from);
-		chain = k->mirror ? ff_mirror_way(t, k->mirror, k->original, from, s.toward)
-		                  : ff_clear_way(t, from, s.to);
+		chain = k->mirror ? ff_light_mirrored(t, k->mirror, k->original, from, s.toward)
+		                  : ff_light_straight(t, from, s.to);
 	}
 	if (chain == CHAIN_NONE) {
 		k->none++;
@@ -112,11 +112,11 @@ static double whole_flux(const struct model *m, const struct look *k)
 	double corner[9];
 
 	if (k->l->kind[k->light] == LIGHT_DIRECTIONAL)
-		return m->element_area[element] *
+		return m->element.area[element] *
 		       -v3_dot(&k->l->direction[3 * k->light], k->normal);
 	for (size_t c = 0; c < 9; c++)
-		corner[c] = m->vertex[3 * (size_t)m->element[3 * (size_t)element + c / 3] + c % 3];
-	return triangle_angle(corner, &k->l->position[3 * k->light]);
+		corner[c] = m->vertex[3 * (size_t)m->element.corner[3 * (size_t)element + c / 3] + c % 3];
+	return geo_solid_angle(corner, &k->l->position[3 * k->light]);
 }
 
 /* From summed weights to fractions of the light's flux. */
@@ -139,14 +139,14 @@ static void weigh(struct ff_thread *t, const struct look *k)
 static int side_towards(const struct model *m, const struct lights *l, size_t light,
                         uint32_t element, double clear)
 {
-	const double *n = &m->element_normal[3 * (size_t)element];
+	const double *n = &m->element.normal[3 * (size_t)element];
 	double to[3], height;
 
 	if (l->kind[light] == LIGHT_DIRECTIONAL) {
 		height = -v3_dot(&l->direction[3 * light], n);
 		return height > 1e-14 ? FRONT : height < -1e-14 ? BACK : -1;
 	}
-	v3_sub(&l->position[3 * light], &m->vertex[3 * (size_t)m->element[3 * (size_t)element]], to);
+	v3_sub(&l->position[3 * light], &m->vertex[3 * (size_t)m->element.corner[3 * (size_t)element]], to);
 	height = v3_dot(to, n);
 	return height > clear ? FRONT : height < -clear ? BACK : -1;
 }
@@ -185,7 +185,7 @@ static void light_elements(struct ff_thread *t, size_t light)
 			continue;
 		k.light = i;
 		k.mirror = g->plane[i] < 0 ? NULL : &g->mirrors.plane[g->plane[i]];
-		for (uint32_t el = 0; el < j->m->elements; el++)
+		for (uint32_t el = 0; el < j->m->element.n; el++)
 			light_element(t, &k, el);
 	}
 }
@@ -206,7 +206,7 @@ static uint32_t cast(struct ff_thread *t, size_t light)
 	for (uint32_t i = 0; i < rays; i++) {
 		double u[3] = { rng_sobol(i, 0, seed), rng_sobol(i, 1, seed), rng_sobol(i, 2, seed) };
 		double org[3], dir[3];
-		light_ray(&j->m->light, light, u, ray_offset(j->rays), org, dir);
+		model_light_ray(&j->m->light, light, u, ray_offset(j->rays), org, dir);
 		ff_follow(t, org, dir, 1, 0);
 	}
 	t->bent_only = 0;
@@ -238,14 +238,14 @@ static double put_straight(struct ff_thread *t, double rays)
 	double first = 0;
 
 	for (size_t i = 0; i < t->lit.n; i++) {
-		uint32_t ps = 2 * m->element_patch[lit[i].column >> 1] + (lit[i].column & 1);
+		uint32_t ps = 2 * m->element.patch[lit[i].column >> 1] + (lit[i].column & 1);
 		double back[3] = { -lit[i].toward[0], -lit[i].toward[1], -lit[i].toward[2] };
 		first += lit[i].chain == 0 ? lit[i].value : 0;
 		v3_normalise(back);
 		if (t->job->is_black[ps])
-			tally_rest(&t->tally, lit[i].chain)->black += lit[i].value * rays;
+			ff_tally_rest(&t->tally, lit[i].chain)->black += lit[i].value * rays;
 		else
-			tally_hit(&t->tally, lit[i].chain, lit[i].column, lit[i].value * rays, back);
+			ff_tally_hit(&t->tally, lit[i].chain, lit[i].column, lit[i].value * rays, back);
 	}
 	return first;
 }
@@ -273,18 +273,18 @@ int ff_light_row(struct ff_thread *t, uint32_t light, struct ff_batch *b, struct
 		return 0;
 	uint32_t rays = cast(t, light);
 	light_elements(t, light);
-	int open = tally_rest(&t->tally, 0)->escape > 0;
+	int open = ff_tally_rest(&t->tally, 0)->escape > 0;
 	if (!open)
 		fit(&t->lit);
 	double straight = put_straight(t, rays);
-	tally_rest(&t->tally, 0)->escape = open ? fmax(0, 1 - straight) * rays : 0;
-	return tally_finish(&t->tally, b, (uint32_t)(2 * m->patches) + light, FF_LIGHT,
-	                    worth(t, rays, straight), rays, e);
+	ff_tally_rest(&t->tally, 0)->escape = open ? fmax(0, 1 - straight) * rays : 0;
+	return ff_tally_finish(&t->tally, b, (uint32_t)(2 * m->patch.n) + light, FF_LIGHT,
+	                       worth(t, rays, straight), rays, e);
 }
 
 /* ---- links ---- */
 
-int ff_light_captures(struct ff_thread *t, uint32_t ps, struct err *e)
+int ff_light_incident(struct ff_thread *t, uint32_t ps, struct err *e)
 {
 	const struct ff_job *j = t->job;
 	const struct lights *l = &j->m->light;
@@ -292,13 +292,13 @@ int ff_light_captures(struct ff_thread *t, uint32_t ps, struct err *e)
 	for (uint32_t light = 0; light < l->n; light++) {
 		uint64_t seed = rng_mix(j->o.seed ^ rng_mix((uint64_t)ps << 32 | light));
 		for (uint32_t i = 0; i < CAPTURES; i++) {
-			struct capture c = { .source = (uint32_t)(2 * j->m->patches) + light,
+			struct ff_incident c = { .source = (uint32_t)(2 * j->m->patch.n) + light,
 			                     .view = i % j->o.points };
 			struct light_sight s;
 			double n[3], from[3];
 			c.element = ff_point(j, ps >> 1, rng_sobol(i, 0, seed), rng_sobol(i, 1, seed), c.x);
 			ff_normal(j, c.element, (int)(ps & 1), n);
-			light_see(l, light, c.x, ray_offset(j->rays), &s);
+			model_light_see(l, light, c.x, ray_offset(j->rays), &s);
 			c.w = fmax(0, v3_dot(n, s.toward)) * s.across * s.falloff;
 			if (!(c.w > 0))
 				continue;
@@ -307,8 +307,8 @@ int ff_light_captures(struct ff_thread *t, uint32_t ps, struct err *e)
 				c.l[k] = s.toward[k];
 			}
 			ray_leave(j->rays, n, from);
-			c.chain = ff_clear_way(t, from, s.to);
-			if (c.chain != CHAIN_NONE && vec_append(&t->captures, &c, 1, sizeof c, e))
+			c.chain = ff_light_straight(t, from, s.to);
+			if (c.chain != CHAIN_NONE && mem_append(&t->incident, &c, 1, sizeof c, e))
 				return -1;
 		}
 	}

@@ -22,15 +22,15 @@ struct flight {
 
 static void capture(struct ff_thread *t, uint32_t source, uint32_t chain, double w)
 {
-	struct capture c = t->now;
+	struct ff_incident c = t->now;
 
 	if (!t->job->is_source[source])
 		return;
 	c.source = source;
-	c.chain = chains_reverse(&t->tally.chains, chain, &t->tally.err);
+	c.chain = bsdf_chains_reverse(&t->tally.chains, chain, &t->tally.err);
 	c.w = w * t->capture_weight;
 	if (c.chain != CHAIN_NONE)
-		vec_append(&t->captures, &c, 1, sizeof c, &t->tally.err);
+		mem_append(&t->incident, &c, 1, sizeof c, &t->tally.err);
 }
 
 /* The direction of a flight that goes on by event `slot`, n the normal of the side it
@@ -49,8 +49,8 @@ static double turn(struct ff_thread *t, uint32_t slot, const double in[3], const
 		return 1;
 	}
 	double u[2] = { rng_uniform(&t->rng), rng_uniform(&t->rng) };
-	return lobe_scatter(m->lobe, (id & 1 ? m->material.beta : m->material.alpha)[id / 2], axis,
-	                    n, u, out);
+	return bsdf_lobe_scatter(m->lobe, (id & 1 ? m->material.beta : m->material.alpha)[id / 2], axis,
+	                         n, u, out);
 }
 
 /* Sends a flight on by event `transmitted` from a hit, or books it as cut. */
@@ -58,7 +58,7 @@ static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_
                  uint32_t element, uint32_t slot, int transmitted, double w,
                  struct flight *out)
 {
-	uint32_t chain = chains_child(&t->tally.chains, in->chain, slot, &t->tally.err);
+	uint32_t chain = bsdf_chains_child(&t->tally.chains, in->chain, slot, &t->tally.err);
 	double n[3];
 
 	if (chain == CHAIN_NONE)
@@ -71,15 +71,15 @@ static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_
 	out->idle = coloured ? 0 : in->idle + 1;
 	if (out->round >= rounds || out->idle > t->job->o.depth)
 		return 0;
-	if (chain != in->chain && chains_length(&t->tally.chains, chain) > t->job->o.depth) {
-		tally_rest(&t->tally, chain)->cut += w;
+	if (chain != in->chain && bsdf_chains_length(&t->tally.chains, chain) > t->job->o.depth) {
+		ff_tally_rest(&t->tally, chain)->cut += w;
 		return 0;
 	}
 	ff_normal(t->job, element, transmitted ? !hit->side : hit->side, n);
 	ray_point(t->job->rays, t->job->m, hit->triangle, hit->w, out->org);
 	double part = turn(t, slot, in->dir, n, out->dir);
 	if (part < 1)
-		tally_rest(&t->tally, chain)->lost += w * (1 - part);
+		ff_tally_rest(&t->tally, chain)->lost += w * (1 - part);
 	ray_leave(t->job->rays, n, out->org);
 	out->w = w * part;
 	out->chain = chain;
@@ -122,18 +122,18 @@ static int land(struct ff_thread *t, const struct flight *f, const struct ray_hi
 	t->turned += t->bent_only && !straight ? f->w : 0;
 	if (hit->triangle == RAY_MISS) {
 		if (!f->tallied)
-			tally_rest(&t->tally, f->chain)->escape += f->w;
+			ff_tally_rest(&t->tally, f->chain)->escape += f->w;
 		return 0;
 	}
-	uint32_t side = (uint32_t)hit->side, ps = 2 * j->m->element_patch[element] + side;
+	uint32_t side = (uint32_t)hit->side, ps = 2 * j->m->element.patch[element] + side;
 	int known = f->tallied || straight;
 	if (j->is_black[ps]) {
 		if (!known)
-			tally_rest(&t->tally, f->chain)->black += f->w;
+			ff_tally_rest(&t->tally, f->chain)->black += f->w;
 		return 0;
 	}
 	if (!known)
-		tally_hit(&t->tally, f->chain, 2 * element + side, f->w, f->dir);
+		ff_tally_hit(&t->tally, f->chain, 2 * element + side, f->w, f->dir);
 	if (t->capturing)
 		capture(t, ps, f->chain, f->w);
 	int lobes_too = j->has_lobe[ps] && f->lobes < t->lobe_depth && (!t->bent_only || f->bends);
@@ -150,8 +150,8 @@ static int land(struct ff_thread *t, const struct flight *f, const struct ray_hi
 
 static uint32_t element_of(const struct ff_job *j, const struct ray_hit *hit)
 {
-	return hit->triangle == RAY_MISS ? 0 : locate(&j->locator, hit->triangle,
-	                                              (float)hit->w[1], (float)hit->w[2]);
+	return hit->triangle == RAY_MISS ? 0 : ray_locate(&j->locator, hit->triangle,
+	                                                  (float)hit->w[1], (float)hit->w[2]);
 }
 
 /* Casts the flights of a stack and all that come of them. */
@@ -202,12 +202,12 @@ struct ff_scramble ff_scramble(const struct ff_job *j, uint32_t row, uint32_t re
 
 /* Directions of an emission lobe about the normal instead of Lambertian ones. */
 static void lobe_directions(const struct ff_job *j, uint32_t ps, double exponent, uint32_t n,
-                            struct ff_batch_rays *b)
+                            struct ff_ray_batch *b)
 {
 	for (uint32_t i = 0; i < n; i++) {
 		double normal[3], dir[3], u[2] = { (double)b->u[2][i], (double)b->u[3][i] };
 		ff_normal(j, b->element[i], (int)(ps & 1), normal);
-		lobe_sample(exponent, normal, normal, u, dir);
+		bsdf_lobe_sample(exponent, normal, normal, u, dir);
 		for (int k = 0; k < 3; k++)
 			b->ray.dir[k][i] = (float)dir[k];
 	}
@@ -215,7 +215,7 @@ static void lobe_directions(const struct ff_job *j, uint32_t ps, double exponent
 
 /* Rays are made, cast, located and tallied by the batch: each loop then overlaps the
  * latencies of many rays, where one ray at a time would wait for each in turn. */
-void ff_batch_cast(const struct ff_job *j, uint32_t n, struct ff_batch_rays *b)
+void ff_rays_cast(const struct ff_job *j, uint32_t n, struct ff_ray_batch *b)
 {
 	static const int32_t nowhere = ~0;
 	const struct locator *l = &j->locator;
@@ -224,26 +224,26 @@ void ff_batch_cast(const struct ff_job *j, uint32_t n, struct ff_batch_rays *b)
 	ray_nearest_batch(j->rays, &b->ray, n);
 	for (uint32_t i = 0; i < n; i++) {
 		way[i] = b->ray.triangle[i] == RAY_MISS ? &nowhere
-		       : locate_begin(l, b->ray.triangle[i], b->ray.w[0][i], b->ray.w[1][i]);
+		       : ray_locate_begin(l, b->ray.triangle[i], b->ray.w[0][i], b->ray.w[1][i]);
 		__builtin_prefetch(way[i]);
 	}
 	for (uint32_t i = 0; i < n; i++)
-		b->hit[i] = locate_below(l, *way[i], b->ray.w[0][i], b->ray.w[1][i]);
+		b->hit[i] = ray_locate_below(l, *way[i], b->ray.w[0][i], b->ray.w[1][i]);
 }
 
-void ff_batch_from_element(const struct ff_job *j, const struct ff_samples *s,
-                           const uint32_t seed[4], uint32_t column, uint32_t first,
-                           uint32_t n, struct ff_batch_rays *b)
+void ff_rays_from_element(const struct ff_job *j, const struct ff_samples *s,
+                          const uint32_t seed[4], uint32_t column, uint32_t first,
+                          uint32_t n, struct ff_ray_batch *b)
 {
 	for (uint32_t i = 0; i < n; i++)
 		b->element[i] = column >> 1;
-	ff_batch_numbers(s, seed, first, n, b);
-	ff_batch_origins(j, (int)(column & 1), n, b);
-	ff_batch_directions(j, (int)(column & 1), n, b);
-	ff_batch_cast(j, n, b);
+	ff_rays_numbers(s, seed, first, n, b);
+	ff_rays_origins(j, (int)(column & 1), n, b);
+	ff_rays_directions(j, (int)(column & 1), n, b);
+	ff_rays_cast(j, n, b);
 }
 
-static void world_ray(const struct ff_job *j, const struct ff_batch_rays *b, uint32_t i,
+static void world_ray(const struct ff_job *j, const struct ff_ray_batch *b, uint32_t i,
                       double org[3], double dir[3])
 {
 	struct ray_units units = ray_units(j->rays);
@@ -256,7 +256,7 @@ static void world_ray(const struct ff_job *j, const struct ff_batch_rays *b, uin
 }
 
 /* Ray i of a batch, at all that may befall it. side: that it left its element by. */
-static void land_apart(struct ff_thread *t, int side, const struct ff_batch_rays *b, uint32_t i)
+static void land_apart(struct ff_thread *t, int side, const struct ff_ray_batch *b, uint32_t i)
 {
 	struct flight stack[MAX_SPLITS + 3], f = { .w = 1 };
 	double x = (double)b->ray.w[0][i], y = (double)b->ray.w[1][i];
@@ -266,7 +266,7 @@ static void land_apart(struct ff_thread *t, int side, const struct ff_batch_rays
 	world_ray(t->job, b, i, f.org, f.dir);
 	if (t->capturing) {
 		double normal[3];
-		t->now = (struct capture){ .element = b->element[i] };
+		t->now = (struct ff_incident){ .element = b->element[i] };
 		ff_normal(t->job, b->element[i], side, normal);
 		v3_mad(f.org, -ray_offset(t->job->rays), normal, t->now.x);
 		memcpy(t->now.l, f.dir, sizeof t->now.l);
@@ -274,7 +274,7 @@ static void land_apart(struct ff_thread *t, int side, const struct ff_batch_rays
 	fly(t, stack, land(t, &f, &hit, b->hit[i], stack));
 }
 
-static void batch_land(struct ff_thread *t, int side, uint32_t n, const struct ff_batch_rays *b)
+static void batch_land(struct ff_thread *t, int side, uint32_t n, const struct ff_ray_batch *b)
 {
 	const uint32_t *place = t->job->places.place;
 	uint32_t escaped = 0, simple = 0;
@@ -292,12 +292,12 @@ static void batch_land(struct ff_thread *t, int side, uint32_t n, const struct f
 		if (at & TALLY_APART) {
 			land_apart(t, side, b, i);
 		} else {
-			tally_count(&t->tally, at);
+			ff_tally_count(&t->tally, at);
 			simple++;
 		}
 	}
 	t->rays += escaped + simple;
-	tally_rest(&t->tally, 0)->escape += escaped;
+	ff_tally_rest(&t->tally, 0)->escape += escaped;
 }
 
 /* Casts `count` rays from a patch-side: Lambertian (exponent < 0) or an emission lobe.
@@ -307,34 +307,34 @@ static void cast(struct ff_thread *t, uint32_t ps, uint32_t count, double expone
 {
 	const struct ff_job *j = t->job;
 	uint32_t each = count / FF_REPLICATES;
-	struct ff_batch_rays b;
+	struct ff_ray_batch b;
 
 	for (uint32_t r = 0; r < FF_REPLICATES; r++) {
 		struct ff_scramble s = ff_scramble(j, 2 * ps + (exponent >= 0), first_replicate + r);
 		for (uint32_t first = 0; first < each; first += RAY_BATCH) {
 			uint32_t n = each - first < RAY_BATCH ? each - first : RAY_BATCH;
-			ff_batch_numbers(&j->of_rows, s.seed, first, n, &b);
-			ff_batch_elements(j, ps >> 1, n, &b);
-			ff_batch_origins(j, (int)(ps & 1), n, &b);
+			ff_rays_numbers(&j->of_rows, s.seed, first, n, &b);
+			ff_rays_elements(j, ps >> 1, n, &b);
+			ff_rays_origins(j, (int)(ps & 1), n, &b);
 			if (exponent < 0)
-				ff_batch_directions(j, (int)(ps & 1), n, &b);
+				ff_rays_directions(j, (int)(ps & 1), n, &b);
 			else
 				lobe_directions(j, ps, exponent, n, &b);
-			ff_batch_cast(j, n, &b);
+			ff_rays_cast(j, n, &b);
 			batch_land(t, (int)(ps & 1), n, &b);
 		}
-		tally_replicate(&t->tally);
+		ff_tally_replicate(&t->tally);
 	}
 }
 
 void ff_lobes_cast(struct ff_thread *t)
 {
-	ff_batch_cast(t->job, t->lobes, &t->lobe);
+	ff_rays_cast(t->job, t->lobes, &t->lobe);
 	batch_land(t, 0, t->lobes, &t->lobe);
 	t->lobes = 0;
 }
 
-static void cast_lobe_ray(struct ff_thread *t, const struct capture *c, int side,
+static void cast_lobe_ray(struct ff_thread *t, const struct ff_incident *c, int side,
                           const double dir[3], double w)
 {
 	struct ray_units units = ray_units(t->job->rays);
@@ -361,32 +361,32 @@ static struct ff_weight diffuse(struct ff_thread *t, uint32_t ps)
 	const struct ff_job *j = t->job;
 	uint32_t rays = ff_row_rays(j, ps);
 	struct ff_weight w = { rays, rays };
-	int gathered = j->gather.rays && j->shoots_diffuse[ps];
-	int alone = gathered && ff_row_is_gathered(j, ps);
+	int gathered = j->reciprocal.rays && j->shoots_diffuse[ps];
+	int alone = gathered && ff_row_is_reciprocal(j, ps);
 
-	if (alone && ff_redistribute(t, ps, 0, &w))
+	if (alone && ff_combine_estimates(t, ps, 0, &w))
 		return w;
 	t->capturing = j->has_lobe[ps];
 	t->capture_weight = 1;
 	cast(t, ps, rays, -1, 0);
 	t->capturing = 0;
 	if (gathered && !alone)
-		ff_redistribute(t, ps, rays, &w);
+		ff_combine_estimates(t, ps, rays, &w);
 	return w;
 }
 
 static int sees_emitter_by_mirror(const struct ff_thread *t)
 {
-	const struct capture *c = t->captures.data;
+	const struct ff_incident *c = t->incident.data;
 
-	for (size_t i = 0; i < t->captures.n; i++)
+	for (size_t i = 0; i < t->incident.n; i++)
 		if (c[i].chain && t->job->emits[c[i].source])
 			return 1;
 	return 0;
 }
 
 /* More ways that light comes to a directional patch-side: as many as an emitter's rays
- * tell, where ideal mirrors and panes bring an emitter's light (ff_links finds out what
+ * tell, where ideal mirrors and panes bring an emitter's light (ff_directional_rows finds out what
  * comes straight by itself). */
 static int capture_more(struct ff_thread *t, uint32_t ps, struct err *e)
 {
@@ -399,8 +399,8 @@ static int capture_more(struct ff_thread *t, uint32_t ps, struct err *e)
 	t->capturing = 1;
 	cast(t, ps, more, -1, FF_REPLICATES);
 	t->capturing = 0;
-	int bad = tally_finish(&t->tally, &unused, ps, FF_DIFFUSE, more, more, e);
-	batch_free(&unused);
+	int bad = ff_tally_finish(&t->tally, &unused, ps, FF_DIFFUSE, more, more, e);
+	ff_batch_free(&unused);
 	return bad;
 }
 
@@ -410,26 +410,26 @@ static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struc
 	uint32_t material = model_patch_material(j->m, ps >> 1);
 
 	t->rng = rng_seed(j->o.seed, ps);
-	t->captures.n = 0;
+	t->incident.n = 0;
 	if (j->shoots_diffuse[ps] || j->has_lobe[ps]) {
 		struct ff_weight w = diffuse(t, ps);
 		struct ff_batch unused = { 0 };
-		if (tally_finish(&t->tally, j->shoots_diffuse[ps] ? b : &unused, ps, FF_DIFFUSE,
-		                 w.samples, w.total, e))
+		if (ff_tally_finish(&t->tally, j->shoots_diffuse[ps] ? b : &unused, ps, FF_DIFFUSE,
+		                    w.samples, w.total, e))
 			return -1;
-		batch_free(&unused);
+		ff_batch_free(&unused);
 	}
 	if (j->shoots_lobe[ps]) {
 		uint32_t rays = ff_row_rays(j, ps);
 		t->lobe_depth = j->o.lobe_depth;
 		cast(t, ps, rays, j->m->material.emission_exponent[2 * material + (ps & 1)], 0);
 		t->lobe_depth = 0;
-		if (tally_finish(&t->tally, b, ps, FF_EMISSION, rays, rays, e))
+		if (ff_tally_finish(&t->tally, b, ps, FF_EMISSION, rays, rays, e))
 			return -1;
 	}
 	if (!j->has_lobe[ps])
 		return 0;
-	return capture_more(t, ps, e) || ff_links(t, ps, cast_lobe_ray, b, e) ? -1 : 0;
+	return capture_more(t, ps, e) || ff_directional_rows(t, ps, cast_lobe_ray, b, e) ? -1 : 0;
 }
 
 int ff_patch_rays(struct ff_thread *t, uint32_t patch, struct ff_batch *b, struct err *e)

@@ -37,11 +37,11 @@ enum { LOOKS_A_RAY = 4 };
 
 struct gatherer {
 	const struct ff_job *job;
-	struct ff_gather *to;
+	struct ff_reciprocal *to;
 	uint32_t **hits;           /* [threads][2P] of the element-side at work */
 	struct vec *met;           /* [threads] uint32_t: patch-sides hit by it */
 	struct vec *pairs;         /* [patches] struct pair, by place */
-	uint32_t *sights;          /* [2E] pairs of an element-side, by place */
+	uint32_t *pairs_of;          /* [2E] pairs of an element-side, by place */
 	struct err *err;           /* [threads] */
 };
 
@@ -54,24 +54,24 @@ static void cast(struct gatherer *g, uint32_t column, int thread, uint32_t lost[
 {
 	const struct ff_job *j = g->job;
 	uint64_t seed = rng_mix(rng_mix(j->o.seed + 1) ^ rng_mix(~(uint64_t)column));
-	uint32_t seeds[FF_DIMS], *hits = g->hits[thread], rays = ff_gather_rays(j, column >> 1);
-	const struct ff_samples *samples = rays < j->o.gather ? &j->of_small : &j->of_gathering;
-	struct ff_batch_rays b;
+	uint32_t seeds[FF_DIMS], *hits = g->hits[thread], rays = ff_reciprocal_rays(j, column >> 1);
+	const struct ff_samples *samples = rays < j->o.gather ? &j->of_small : &j->of_reciprocal;
+	struct ff_ray_batch b;
 
 	for (int d = 0; d < FF_DIMS; d++)
 		seeds[d] = rng_sobol_seed(seed, d);
 	for (uint32_t first = 0; first < rays; first += RAY_BATCH) {
 		uint32_t n = rays - first < RAY_BATCH ? rays - first : RAY_BATCH;
-		ff_batch_from_element(j, samples, seeds, column, first, n, &b);
+		ff_rays_from_element(j, samples, seeds, column, first, n, &b);
 		for (uint32_t i = 0; i < n; i++) {
 			if (b.ray.triangle[i] == RAY_MISS) {
 				lost[0]++;
 				continue;
 			}
-			uint32_t ps = 2 * j->m->element_patch[b.hit[i]] + b.ray.side[i];
+			uint32_t ps = 2 * j->m->element.patch[b.hit[i]] + b.ray.side[i];
 			lost[1] += j->is_black[ps];
 			if (j->shoots_diffuse[ps] && hits[ps]++ == 0)
-				vec_append(&g->met[thread], &ps, 1, sizeof ps, &g->err[thread]);
+				mem_append(&g->met[thread], &ps, 1, sizeof ps, &g->err[thread]);
 		}
 	}
 }
@@ -80,19 +80,19 @@ static void gather_element(struct gatherer *g, uint32_t patch, uint32_t column, 
 {
 	struct vec *met = &g->met[thread];
 	uint32_t lost[2] = { 0 }, ps = 2 * patch + (column & 1);
-	double part = g->job->m->element_area[column >> 1] /
-	              (g->job->m->patch_area[patch] * ff_gather_rays(g->job, column >> 1));
+	double part = g->job->m->element.area[column >> 1] /
+	              (g->job->m->patch.area[patch] * ff_reciprocal_rays(g->job, column >> 1));
 
 	met->n = 0;
 	cast(g, column, thread, lost);
 	g->to->escape[ps] += part * lost[0];
 	g->to->black[ps] += part * lost[1];
-	g->sights[g->job->places.place[column] & ~TALLY_APART] = (uint32_t)met->n;
+	g->pairs_of[g->job->places.place[column] & ~TALLY_APART] = (uint32_t)met->n;
 	for (size_t i = 0; i < met->n; i++) {
 		uint32_t source = ((uint32_t *)met->data)[i];
 		struct pair p = { source, g->hits[thread][source] };
 		g->hits[thread][source] = 0;
-		vec_append(&g->pairs[patch], &p, 1, sizeof p, &g->err[thread]);
+		mem_append(&g->pairs[patch], &p, 1, sizeof p, &g->err[thread]);
 	}
 }
 
@@ -104,7 +104,7 @@ static void gather_patches(void *arg, size_t begin, size_t end, int thread)
 	for (uint32_t ps = 2 * (uint32_t)begin; ps < 2 * end; ps++) {
 		if (j->is_black[ps] || j->is_ideal[ps])
 			continue;
-		for (uint32_t el = j->m->patch_start[ps >> 1]; el < j->m->patch_start[(ps >> 1) + 1]; el++)
+		for (uint32_t el = j->m->patch.start[ps >> 1]; el < j->m->patch.start[(ps >> 1) + 1]; el++)
 			gather_element(g, ps >> 1, 2 * el + (ps & 1), thread);
 	}
 }
@@ -123,8 +123,8 @@ static int takes(double patch_area, uint32_t cast, double element_area, uint32_t
 /* Pairs by receiver, in order, become lists by source, in the same order. */
 static int transpose(struct gatherer *g, struct err *e)
 {
-	struct ff_gather *to = g->to;
-	size_t patches = g->job->m->patches, sides = 2 * patches, place = 0;
+	struct ff_reciprocal *to = g->to;
+	size_t patches = g->job->m->patch.n, sides = 2 * patches, place = 0;
 
 	for (size_t p = 0; p < patches; p++)
 		for (size_t i = 0; i < g->pairs[p].n; i++)
@@ -136,9 +136,9 @@ static int transpose(struct gatherer *g, struct err *e)
 		return -1;
 	for (size_t p = 0; p < patches; p++) {
 		const struct pair *pair = g->pairs[p].data, *last = pair + g->pairs[p].n;
-		for (; place < 2 * (size_t)g->job->m->patch_start[p + 1]; place++)
-			for (uint32_t k = g->sights[place]; k && pair < last; k--, pair++)
-				to->seen[to->start[pair->source]++] = (struct ff_gathered){
+		for (; place < 2 * (size_t)g->job->m->patch.start[p + 1]; place++)
+			for (uint32_t k = g->pairs_of[place]; k && pair < last; k--, pair++)
+				to->seen[to->start[pair->source]++] = (struct ff_receiver_hits){
 					g->job->places.column[place], pair->count };
 		free(g->pairs[p].data);
 		g->pairs[p] = (struct vec){ 0 };
@@ -153,21 +153,21 @@ static void bound_patches(const struct ff_job *j, double (*centre)[4])
 {
 	const struct model *m = j->m;
 
-	for (size_t i = 0; i < 3 * m->elements; i++) {
-		uint32_t p = m->element_patch[i / 3];
-		v3_mad(centre[p], m->element_area[i / 3] / (3 * m->patch_area[p]),
-		       &m->vertex[3 * (size_t)m->element[i]], centre[p]);
+	for (size_t i = 0; i < 3 * m->element.n; i++) {
+		uint32_t p = m->element.patch[i / 3];
+		v3_mad(centre[p], m->element.area[i / 3] / (3 * m->patch.area[p]),
+		       &m->vertex[3 * (size_t)m->element.corner[i]], centre[p]);
 	}
-	for (size_t i = 0; i < 3 * m->elements; i++) {
-		double *c = centre[m->element_patch[i / 3]], d[3];
-		v3_sub(&m->vertex[3 * (size_t)m->element[i]], c, d);
+	for (size_t i = 0; i < 3 * m->element.n; i++) {
+		double *c = centre[m->element.patch[i / 3]], d[3];
+		v3_sub(&m->vertex[3 * (size_t)m->element.corner[i]], c, d);
 		c[3] = fmax(c[3], v3_length(d));
 	}
 }
 
 static int any_ideal(const struct ff_job *j)
 {
-	for (size_t ps = 0; ps < 2 * j->m->patches; ps++)
+	for (size_t ps = 0; ps < 2 * j->m->patch.n; ps++)
 		if (j->is_ideal[ps])
 			return 1;
 	return 0;
@@ -175,22 +175,22 @@ static int any_ideal(const struct ff_job *j)
 
 static int allocate(struct gatherer *g, size_t threads, struct err *e)
 {
-	size_t patches = g->job->m->patches, sides = 2 * patches;
-	struct ff_gather *to = g->to;
+	size_t patches = g->job->m->patch.n, sides = 2 * patches;
+	struct ff_reciprocal *to = g->to;
 	int good = 1;
 
 	g->hits = mem_new(threads, sizeof *g->hits, "gathering", e);
 	g->met = mem_new(threads, sizeof *g->met, "gathering", e);
 	g->err = mem_new(threads, sizeof *g->err, "gathering", e);
 	g->pairs = mem_new(patches, sizeof *g->pairs, "gathering", e);
-	g->sights = mem_new(2 * g->job->m->elements, sizeof *g->sights, "gathering", e);
+	g->pairs_of = mem_new(2 * g->job->m->element.n, sizeof *g->pairs_of, "gathering", e);
 	to->start = mem_new(sides + 1, sizeof *to->start, "gathered light", e);
 	to->centre = mem_new(patches, sizeof *to->centre, "gathered light", e);
 	to->escape = mem_new(sides, sizeof *to->escape, "gathered light", e);
 	to->black = mem_new(sides, sizeof *to->black, "gathered light", e);
 	for (size_t t = 0; g->hits && t < threads; t++)
 		good &= (g->hits[t] = mem_new(sides, sizeof **g->hits, "gathering", e)) != NULL;
-	return good && g->hits && g->met && g->err && g->pairs && g->sights && to->start &&
+	return good && g->hits && g->met && g->err && g->pairs && g->pairs_of && to->start &&
 	       to->centre && to->escape && to->black ? 0 : -1;
 }
 
@@ -202,13 +202,13 @@ static void release(struct gatherer *g, size_t threads)
 		if (g->met)
 			free(g->met[t].data);
 	}
-	for (size_t p = 0; g->pairs && p < g->job->m->patches; p++)
+	for (size_t p = 0; g->pairs && p < g->job->m->patch.n; p++)
 		free(g->pairs[p].data);
 	free(g->hits);
 	free(g->met);
 	free(g->err);
 	free(g->pairs);
-	free(g->sights);
+	free(g->pairs_of);
 }
 
 /* Whether the largest patch-side that shoots is large beside the smallest element. */
@@ -216,18 +216,18 @@ static int any_takes(const struct ff_job *j)
 {
 	double most = 0, least = INFINITY;
 
-	for (size_t ps = 0; ps < 2 * j->m->patches; ps++)
+	for (size_t ps = 0; ps < 2 * j->m->patch.n; ps++)
 		if (j->shoots_diffuse[ps])
-			most = fmax(most, j->m->patch_area[ps >> 1]);
-	for (size_t i = 0; i < j->m->elements; i++)
-		least = fmin(least, j->m->element_area[i]);
+			most = fmax(most, j->m->patch.area[ps >> 1]);
+	for (size_t i = 0; i < j->m->element.n; i++)
+		least = fmin(least, j->m->element.area[i]);
 	return takes(most, j->o.rays, least, j->o.gather);
 }
 
 /* Rows by formula are made of sights too, whatever their sizes. */
 static int any_by_formula(const struct ff_job *j)
 {
-	for (uint32_t ps = 0; ps < 2 * j->m->patches; ps++)
+	for (uint32_t ps = 0; ps < 2 * j->m->patch.n; ps++)
 		if (is_by_formula(j, ps))
 			return 1;
 	return 0;
@@ -238,15 +238,15 @@ static double patch_rays(const struct ff_job *j, uint32_t patch)
 {
 	double n = 0;
 
-	for (uint32_t i = j->m->patch_start[patch]; i < j->m->patch_start[patch + 1]; i++)
-		n += ff_gather_rays(j, i);
+	for (uint32_t i = j->m->patch.start[patch]; i < j->m->patch.start[patch + 1]; i++)
+		n += ff_reciprocal_rays(j, i);
 	return n;
 }
 
-int ff_gather(struct ff_job *j, double *rays, const struct progress *progress, struct err *e)
+int ff_reciprocal_cast(struct ff_job *j, double *rays, const struct progress *progress, struct err *e)
 {
 	size_t threads = j->o.threads > 0 ? (size_t)j->o.threads : 1;
-	struct gatherer g = { .job = j, .to = &j->gather };
+	struct gatherer g = { .job = j, .to = &j->reciprocal };
 	int bad;
 
 	if (!any_takes(j) && !any_by_formula(j))
@@ -254,55 +254,55 @@ int ff_gather(struct ff_job *j, double *rays, const struct progress *progress, s
 	bad = allocate(&g, threads, e);
 
 	if (!bad) {
-		par_for(j->m->patches, 1, (int)threads, gather_patches, &g, progress);
-		bound_patches(j, j->gather.centre);
-		j->gather.alone = !any_ideal(j);
+		par_for(j->m->patch.n, 1, (int)threads, gather_patches, &g, progress);
+		bound_patches(j, j->reciprocal.centre);
+		j->reciprocal.alone = !any_ideal(j);
 	}
 	for (size_t t = 0; !bad && t < threads; t++)
 		if (g.err[t].set)
 			bad = err_set(e, "%s", g.err[t].text);
-	for (uint32_t ps = 0; !bad && ps < 2 * j->m->patches; ps++)
+	for (uint32_t ps = 0; !bad && ps < 2 * j->m->patch.n; ps++)
 		if (!j->is_black[ps] && !j->is_ideal[ps])
 			*rays += patch_rays(j, ps >> 1);
 	bad = bad || transpose(&g, e);
 	release(&g, threads);
-	j->gather.rays = bad ? 0 : j->o.gather;
+	j->reciprocal.rays = bad ? 0 : j->o.gather;
 	return bad ? -1 : 0;
 }
 
-void ff_gather_free(struct ff_gather *g)
+void ff_reciprocal_free(struct ff_reciprocal *g)
 {
 	free(g->start);
 	free(g->seen);
 	free(g->centre);
 	free(g->escape);
 	free(g->black);
-	*g = (struct ff_gather){ 0 };
+	*g = (struct ff_reciprocal){ 0 };
 }
 
 /* ---- rows of what was gathered ---- */
 
 static int element_takes(const struct ff_job *j, uint32_t ps, uint32_t column)
 {
-	return takes(j->m->patch_area[ps >> 1], j->o.rays >> (j->halvings ? j->halvings[ps] : 0),
-	             j->m->element_area[column >> 1], ff_gather_rays(j, column >> 1));
+	return takes(j->m->patch.area[ps >> 1], j->o.rays >> (j->halvings ? j->halvings[ps] : 0),
+	             j->m->element.area[column >> 1], ff_reciprocal_rays(j, column >> 1));
 }
 
-int ff_row_is_seen(const struct ff_job *j, uint32_t ps)
+int ff_row_is_of_emitter(const struct ff_job *j, uint32_t ps)
 {
 	return is_by_formula(j, ps) ||
 	       (j->emits[ps] &&
-	        j->m->elements <= LOOKS_A_RAY * (uint64_t)j->o.rays * j->o.emitter_gain);
+	        j->m->element.n <= LOOKS_A_RAY * (uint64_t)j->o.rays * j->o.emitter_gain);
 }
 
-int ff_row_is_gathered(const struct ff_job *j, uint32_t ps)
+int ff_row_is_reciprocal(const struct ff_job *j, uint32_t ps)
 {
-	const struct ff_gather *g = &j->gather;
+	const struct ff_reciprocal *g = &j->reciprocal;
 	uint64_t i = g->start[ps], end = g->start[ps + 1];
 
 	if (!g->alone || j->has_lobe[ps])
 		return 0;
-	if (ff_row_is_seen(j, ps))
+	if (ff_row_is_of_emitter(j, ps))
 		return 1;
 	if (i == end)
 		return 0;
@@ -311,22 +311,22 @@ int ff_row_is_gathered(const struct ff_job *j, uint32_t ps)
 	return i == end;
 }
 
-/* F[ps -> element-side] from what was gathered, as ff_see gives it. */
-static double recall(struct ff_thread *t, uint32_t ps)
+/* F[ps -> element-side] from what was gathered, as ff_emitter_row gives it. */
+static double reciprocal_shares(struct ff_thread *t, uint32_t ps)
 {
 	const struct ff_job *j = t->job;
-	const struct ff_gather *g = &j->gather;
+	const struct ff_reciprocal *g = &j->reciprocal;
 	double sum = 0;
 
-	t->sights.n = 0;
+	t->shares.n = 0;
 	for (uint64_t i = g->start[ps]; i < g->start[ps + 1]; i++) {
 		uint32_t element = g->seen[i].column >> 1;
-		double n = g->seen[i].count, rays = ff_gather_rays(j, element);
-		double one = j->m->element_area[element] / (j->m->patch_area[ps >> 1] * rays);
-		struct ff_sight s = { g->seen[i].column, one * n, one * one * n * (1 - n / rays) };
+		double n = g->seen[i].count, rays = ff_reciprocal_rays(j, element);
+		double one = j->m->element.area[element] / (j->m->patch.area[ps >> 1] * rays);
+		struct ff_share s = { g->seen[i].column, one * n, one * one * n * (1 - n / rays) };
 		if (!element_takes(j, ps, s.column))
 			continue;
-		if (vec_append(&t->sights, &s, 1, sizeof s, &t->tally.err))
+		if (mem_append(&t->shares, &s, 1, sizeof s, &t->tally.err))
 			return 0;
 		sum += s.w;
 	}
@@ -337,42 +337,42 @@ static double recall(struct ff_thread *t, uint32_t ps)
 static uint32_t next_taken(const struct ff_thread *t, uint32_t ps, uint64_t place)
 {
 	const struct ff_job *j = t->job;
-	uint32_t at = tally_next(&t->tally, place);
+	uint32_t at = ff_tally_next(&t->tally, place);
 
-	while (at != UINT32_MAX && (j->is_ideal[tally_side_at(&t->tally, at)] ||
-	                            !(ff_row_is_seen(j, ps) || element_takes(j, ps, j->places.column[at]))))
-		at = tally_next(&t->tally, (uint64_t)at + 1);
+	while (at != UINT32_MAX && (j->is_ideal[ff_tally_side_at(&t->tally, at)] ||
+	                            !(ff_row_is_of_emitter(j, ps) || element_takes(j, ps, j->places.column[at]))))
+		at = ff_tally_next(&t->tally, (uint64_t)at + 1);
 	return at;
 }
 
 /* The part of the row that its own rays bring to elements whose shares are taken from
  * elsewhere. */
-static double brought(const struct ff_thread *t, uint32_t ps, uint32_t cast)
+static double own_landed(const struct ff_thread *t, uint32_t ps, uint32_t cast)
 {
 	double sum = 0;
 
 	for (uint32_t place = next_taken(t, ps, 0); place != UINT32_MAX;
 	     place = next_taken(t, ps, (uint64_t)place + 1))
-		sum += tally_counted(&t->tally, place);
+		sum += ff_tally_counted(&t->tally, place);
 	return sum / cast;
 }
 
 /* What sights of elements add up to, and how sure it is. */
-struct tale {
+struct share_sum {
 	double sum, variance;
 	double doubt;             /* summed standard errors */
 	double sample;            /* what one sample of the row weighs: its light on elements, per
 	                             area, has the variance of so many independent ones */
 };
 
-static struct tale add_up(const struct ff_thread *t, double sum)
+static struct share_sum add_up(const struct ff_thread *t, double sum)
 {
-	const struct ff_sight *s = t->sights.data;
-	struct tale a = { .sum = sum };
+	const struct ff_share *s = t->shares.data;
+	struct share_sum a = { .sum = sum };
 	double light = 0, spread = 0;
 
-	for (size_t i = 0; i < t->sights.n; i++) {
-		double area = t->job->m->element_area[s[i].column >> 1];
+	for (size_t i = 0; i < t->shares.n; i++) {
+		double area = t->job->m->element.area[s[i].column >> 1];
 		a.variance += s[i].variance;
 		a.doubt += sqrt(s[i].variance);
 		light += s[i].w / area;
@@ -385,7 +385,7 @@ static struct tale add_up(const struct ff_thread *t, double sum)
 /* The part of a row that lands on elements, of which so many rays say `lands`: the mean of
  * that and of what the elements' sights add up to, each for as much as it is certain. Where
  * no ray goes elsewhere, so it is, if the sights do not surely deny it. */
-static double settle(double lands, double rays, const struct tale *a)
+static double combine_landed(double lands, double rays, const struct share_sum *a)
 {
 	double own = fmax(lands * (1 - lands), 1 / rays) / rays;
 
@@ -400,22 +400,22 @@ static void guess_arrival(struct ff_thread *t, uint32_t ps, uint32_t target)
 	double *toward = t->tally.toward[target];
 
 	if (t->job->has_lobe[target] && !(v3_dot(toward, toward) > 0))
-		v3_sub(t->job->gather.centre[ps >> 1], t->job->gather.centre[target >> 1], toward);
+		v3_sub(t->job->reciprocal.centre[ps >> 1], t->job->reciprocal.centre[target >> 1], toward);
 }
 
 /* The sights, scaled, in place of what the row's own rays say of the same elements. */
 static void put_sights(struct ff_thread *t, uint32_t ps, double scale)
 {
 	const struct ff_job *j = t->job;
-	const struct ff_sight *s = t->sights.data;
+	const struct ff_share *s = t->shares.data;
 
 	for (uint32_t place = next_taken(t, ps, 0); place != UINT32_MAX;
 	     place = next_taken(t, ps, (uint64_t)place + 1))
-		tally_set(&t->tally, place, 0, 0);
-	for (size_t i = 0; i < t->sights.n; i++) {
-		tally_set(&t->tally, j->places.place[s[i].column] & ~TALLY_APART, scale * s[i].w,
-		          scale * scale * s[i].variance);
-		guess_arrival(t, ps, 2 * j->m->element_patch[s[i].column >> 1] + (s[i].column & 1));
+		ff_tally_set(&t->tally, place, 0, 0);
+	for (size_t i = 0; i < t->shares.n; i++) {
+		ff_tally_set(&t->tally, j->places.place[s[i].column] & ~TALLY_APART, scale * s[i].w,
+		             scale * scale * s[i].variance);
+		guess_arrival(t, ps, 2 * j->m->element.patch[s[i].column >> 1] + (s[i].column & 1));
 	}
 }
 
@@ -423,10 +423,10 @@ static void put_sights(struct ff_thread *t, uint32_t ps, double scale)
  * patch's elements say. */
 static void book_lost(struct ff_thread *t, uint32_t ps, double lost)
 {
-	double escape = t->job->gather.escape[ps], black = t->job->gather.black[ps];
+	double escape = t->job->reciprocal.escape[ps], black = t->job->reciprocal.black[ps];
 	double part = escape + black > 0 ? black / (escape + black) : 0;
 
-	*tally_rest(&t->tally, 0) = (struct tally_rest){ .escape = lost * (1 - part),
+	*ff_tally_rest(&t->tally, 0) = (struct tally_rest){ .escape = lost * (1 - part),
 	                                                 .black = lost * part };
 }
 
@@ -436,17 +436,17 @@ static double landing(const struct ff_thread *t, uint32_t ps, uint32_t cast, dou
 	const struct ff_job *j = t->job;
 
 	*rays = cast ? cast : patch_rays(j, ps >> 1);
-	return cast ? brought(t, ps, cast) : 1 - j->gather.escape[ps] - j->gather.black[ps];
+	return cast ? own_landed(t, ps, cast) : 1 - j->reciprocal.escape[ps] - j->reciprocal.black[ps];
 }
 
-int ff_redistribute(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_weight *w)
+int ff_combine_estimates(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_weight *w)
 {
 	const struct ff_job *j = t->job;
-	int seen = ff_row_is_seen(j, ps);
-	double sum = seen ? ff_see(t, ps, ff_row_rays(j, ps), &t->tally.err) : recall(t, ps);
-	struct tale a = add_up(t, sum);
-	double rays, said = landing(t, ps, cast, &rays), lands = settle(said, rays, &a);
-	double per_sample = a.sample / (seen ? 1 : worth(j->gather.rays));
+	int seen = ff_row_is_of_emitter(j, ps);
+	double sum = seen ? ff_emitter_row(t, ps, ff_row_rays(j, ps), &t->tally.err) : reciprocal_shares(t, ps);
+	struct share_sum a = add_up(t, sum);
+	double rays, said = landing(t, ps, cast, &rays), lands = combine_landed(said, rays, &a);
+	double per_sample = a.sample / (seen ? 1 : worth(j->reciprocal.rays));
 
 	if (t->tally.err.set || !(lands > 0 && sum > 0) ||
 	    fabs(sum - said) > misfit * said + 3 * sqrt(fmax(sum, said) / rays))

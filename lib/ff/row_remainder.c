@@ -4,28 +4,28 @@
 #include <stdlib.h>
 #include <string.h>
 
-int ff_rest_init(struct ff_rest *r, const struct ff_job *j, struct err *e)
+int ff_remainder_init(struct ff_rest *r, const struct ff_job *j, struct err *e)
 {
 	*r = (struct ff_rest){ 0 };
-	r->landed = mem_new(2 * j->m->patches, sizeof *r->landed, "landings of rays", e);
+	r->landed = mem_new(2 * j->m->patch.n, sizeof *r->landed, "landings of rays", e);
 	return r->landed ? 0 : -1;
 }
 
-void ff_rest_free(struct ff_rest *r)
+void ff_remainder_free(struct ff_rest *r)
 {
 	free(r->landed);
 	*r = (struct ff_rest){ 0 };
 }
 
 static void count(struct ff_rest *r, const struct ff_job *j, uint32_t replicate, uint32_t n,
-                  const struct ff_batch_rays *b)
+                  const struct ff_ray_batch *b)
 {
 	for (uint32_t i = 0; i < n; i++) {
 		if (b->ray.triangle[i] == RAY_MISS) {
 			r->escaped++;
 			continue;
 		}
-		uint32_t ps = 2 * j->m->element_patch[b->hit[i]] + b->ray.side[i];
+		uint32_t ps = 2 * j->m->element.patch[b->hit[i]] + b->ray.side[i];
 		if (j->is_black[ps])
 			r->black++;
 		else
@@ -33,28 +33,28 @@ static void count(struct ff_rest *r, const struct ff_job *j, uint32_t replicate,
 	}
 }
 
-void ff_rest_cast(struct ff_rest *r, const struct ff_job *j, uint32_t ps, uint32_t rays)
+void ff_remainder_cast(struct ff_rest *r, const struct ff_job *j, uint32_t ps, uint32_t rays)
 {
-	struct ff_batch_rays b;
+	struct ff_ray_batch b;
 
-	memset(r->landed, 0, 2 * j->m->patches * sizeof *r->landed);
+	memset(r->landed, 0, 2 * j->m->patch.n * sizeof *r->landed);
 	r->escaped = r->black = 0;
 	r->rays += rays;
 	for (uint32_t k = 0; k < FF_REPLICATES; k++) {
 		struct ff_scramble s = ff_scramble(j, 2 * ps, k);
 		for (uint32_t first = 0; first < rays / FF_REPLICATES; first += RAY_BATCH) {
 			uint32_t left = rays / FF_REPLICATES - first, n = left < RAY_BATCH ? left : RAY_BATCH;
-			ff_batch_numbers(&j->of_rows, s.seed, first, n, &b);
-			ff_batch_elements(j, ps >> 1, n, &b);
-			ff_batch_origins(j, (int)(ps & 1), n, &b);
-			ff_batch_directions(j, (int)(ps & 1), n, &b);
-			ff_batch_cast(j, n, &b);
+			ff_rays_numbers(&j->of_rows, s.seed, first, n, &b);
+			ff_rays_elements(j, ps >> 1, n, &b);
+			ff_rays_origins(j, (int)(ps & 1), n, &b);
+			ff_rays_directions(j, (int)(ps & 1), n, &b);
+			ff_rays_cast(j, n, &b);
 			count(r, j, k, n, &b);
 		}
 	}
 }
 
-double ff_rest_landed(const struct ff_rest *r, uint32_t ps)
+double ff_remainder_landed(const struct ff_rest *r, uint32_t ps)
 {
 	double n = 0;
 
@@ -63,9 +63,9 @@ double ff_rest_landed(const struct ff_rest *r, uint32_t ps)
 	return n;
 }
 
-double ff_rest_variance(const struct ff_rest *r, uint32_t ps)
+double ff_remainder_variance(const struct ff_rest *r, uint32_t ps)
 {
-	double mean = ff_rest_landed(r, ps) / FF_REPLICATES, square = 0;
+	double mean = ff_remainder_landed(r, ps) / FF_REPLICATES, square = 0;
 
 	for (int k = 0; k < FF_REPLICATES; k++)
 		square += (r->landed[ps][k] - mean) * (r->landed[ps][k] - mean);

@@ -59,14 +59,14 @@ static double small_area(const struct model *m)
 {
 	double sum = 0, squares = 0;
 
-	for (size_t i = 0; i < m->elements; i++) {
-		sum += m->element_area[i];
-		squares += m->element_area[i] * m->element_area[i];
+	for (size_t i = 0; i < m->element.n; i++) {
+		sum += m->element.area[i];
+		squares += m->element.area[i] * m->element.area[i];
 	}
 	return squares / (4 * sum);
 }
 
-int ff_points(struct ff_job *j, struct err *e)
+int ff_sobol_points(struct ff_job *j, struct err *e)
 {
 	uint32_t each = j->o.rays / FF_REPLICATES, gather = j->o.gather;
 
@@ -76,6 +76,6 @@ int ff_points(struct ff_job *j, struct err *e)
 		j->small_area = small_area(j->m);
 	uint32_t least = each >> ff_most_halvings(j->o.rays);
 	return fill_samples(&j->of_rows, least, (uint64_t)each * j->o.emitter_gain, e) ||
-	       fill_samples(&j->of_gathering, gather, gather, e) ||
+	       fill_samples(&j->of_reciprocal, gather, gather, e) ||
 	       fill_samples(&j->of_small, gather / 4, gather / 4, e) ? -1 : 0;
 }

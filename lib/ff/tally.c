@@ -18,35 +18,35 @@ static uint32_t slot_of(struct tally *t, uint32_t chain)
 
 	if (chain >= t->chain_slot.n) {
 		size_t more = t->chains.n - t->chain_slot.n;
-		if (vec_reserve(&t->chain_slot, more, sizeof(uint32_t), &t->err))
+		if (mem_reserve(&t->chain_slot, more, sizeof(uint32_t), &t->err))
 			return 0;
 		memset((uint32_t *)t->chain_slot.data + t->chain_slot.n, 0, more * sizeof(uint32_t));
 		t->chain_slot.n += more;
 	}
 	uint32_t *slot = (uint32_t *)t->chain_slot.data + chain;
 	if (*slot == 0) {
-		if (vec_append(&t->slot_chain, &chain, 1, sizeof chain, &t->err) ||
-		    vec_append(&t->rest, &none, 1, sizeof none, &t->err))
+		if (mem_append(&t->slot_chain, &chain, 1, sizeof chain, &t->err) ||
+		    mem_append(&t->rest, &none, 1, sizeof none, &t->err))
 			return 0;
 		*slot = (uint32_t)t->rest.n;
 	}
 	return *slot - 1;
 }
 
-int tally_places_init(struct tally_places *p, const struct model *m, const uint8_t *apart,
-                      struct err *e)
+int ff_tally_places_init(struct tally_places *p, const struct model *m, const uint8_t *apart,
+                         struct err *e)
 {
 	uint32_t place = 0;
 
 	*p = (struct tally_places){ 0 };
-	if (m->elements >= TALLY_APART / 2)
+	if (m->element.n >= TALLY_APART / 2)
 		return err_set(e, "more than %u elements", TALLY_APART / 2 - 1);
-	p->place = mem_new(2 * m->elements, sizeof *p->place, "order of elements", e);
-	p->column = mem_new(2 * m->elements, sizeof *p->column, "order of elements", e);
+	p->place = mem_new(2 * m->element.n, sizeof *p->place, "order of elements", e);
+	p->column = mem_new(2 * m->element.n, sizeof *p->column, "order of elements", e);
 	if (!p->place || !p->column)
 		return -1;
-	for (uint32_t ps = 0; ps < 2 * m->patches; ps++)
-		for (uint32_t el = m->patch_start[ps >> 1]; el < m->patch_start[(ps >> 1) + 1]; el++) {
+	for (uint32_t ps = 0; ps < 2 * m->patch.n; ps++)
+		for (uint32_t el = m->patch.start[ps >> 1]; el < m->patch.start[(ps >> 1) + 1]; el++) {
 			uint32_t column = 2 * el + (ps & 1);
 			p->place[column] = place | (apart[ps] ? TALLY_APART : 0);
 			p->column[place++] = column;
@@ -54,30 +54,30 @@ int tally_places_init(struct tally_places *p, const struct model *m, const uint8
 	return 0;
 }
 
-void tally_places_free(struct tally_places *p)
+void ff_tally_places_free(struct tally_places *p)
 {
 	free(p->place);
 	free(p->column);
 	*p = (struct tally_places){ 0 };
 }
 
-int tally_init(struct tally *t, const struct model *m, const struct tally_places *places,
-               const uint8_t *has_lobe, uint32_t chain_most, struct err *e)
+int ff_tally_init(struct tally *t, const struct model *m, const struct tally_places *places,
+                  const uint8_t *has_lobe, uint32_t chain_most, struct err *e)
 {
-	size_t sides = 2 * m->elements;
+	size_t sides = 2 * m->element.n;
 
 	*t = (struct tally){ .m = m, .places = places, .has_lobe = has_lobe,
 	                     .words = (sides + 4095) / 4096 };
-	if (chains_init(&t->chains, m, chain_most, e))
+	if (bsdf_chains_init(&t->chains, m, chain_most, e))
 		return -1;
 	t->count = mem_new(sides, sizeof *t->count, "row tally", e);
 	t->dense = mem_new(sides, sizeof *t->dense, "row tally", e);
 	t->seen = mem_new(64 * t->words, sizeof *t->seen, "row tally", e);
 	t->words_seen = mem_new(t->words, sizeof *t->words_seen, "row tally", e);
-	t->replicate = mem_new(2 * m->patches, sizeof *t->replicate, "row tally", e);
-	t->square = mem_new(2 * m->patches, sizeof *t->square, "row tally", e);
-	t->variance = mem_new(2 * m->patches, sizeof *t->variance, "row tally", e);
-	t->toward = mem_new(2 * m->patches, sizeof *t->toward, "row tally", e);
+	t->replicate = mem_new(2 * m->patch.n, sizeof *t->replicate, "row tally", e);
+	t->square = mem_new(2 * m->patch.n, sizeof *t->square, "row tally", e);
+	t->variance = mem_new(2 * m->patch.n, sizeof *t->variance, "row tally", e);
+	t->toward = mem_new(2 * m->patch.n, sizeof *t->toward, "row tally", e);
 	if (!t->count || !t->dense || !t->seen || !t->words_seen || !t->replicate ||
 	    !t->square || !t->variance || !t->toward)
 		return -1;
@@ -85,7 +85,7 @@ int tally_init(struct tally *t, const struct model *m, const struct tally_places
 	return t->err.set ? err_set(e, "%s", t->err.text) : 0;
 }
 
-void tally_free(struct tally *t)
+void ff_tally_free(struct tally *t)
 {
 	void *array[] = { t->count, t->dense, t->seen, t->words_seen, t->replicate,
 		t->square, t->variance, t->toward, t->rest.data, t->slot_chain.data,
@@ -93,14 +93,14 @@ void tally_free(struct tally *t)
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
-	tally_far_free(&t->far);
-	chains_free(&t->chains);
+	ff_tally_chains_free(&t->far);
+	bsdf_chains_free(&t->chains);
 	*t = (struct tally){ 0 };
 }
 
 /* ---- while a row is cast ---- */
 
-struct tally_rest *tally_rest(struct tally *t, uint32_t chain)
+struct tally_rest *ff_tally_rest(struct tally *t, uint32_t chain)
 {
 	uint32_t slot = slot_of(t, chain);
 
@@ -113,34 +113,34 @@ static void note_arrival(struct tally *t, uint32_t chain, uint32_t target, doubl
 	struct tally_arrival a = { slot_of(t, chain), target,
 	                           { -w * dir[0], -w * dir[1], -w * dir[2] } };
 
-	vec_append(&t->arrival, &a, 1, sizeof a, &t->err);
+	mem_append(&t->arrival, &a, 1, sizeof a, &t->err);
 }
 
 static void hit_near(struct tally *t, uint32_t place, uint32_t ps, double w)
 {
 	if (w == 1) {
-		tally_count(t, place);
+		ff_tally_count(t, place);
 		return;
 	}
 	t->weighed = 1;
 	t->dense[place] += w;
 	t->replicate[ps] += w;
-	tally_see(t, place);
+	ff_tally_see(t, place);
 }
 
 static void hit_far(struct tally *t, uint32_t chain, uint32_t place, uint32_t element_side,
                     double w)
 {
-	struct tally_landing l = { slot_of(t, chain) * 2 * (uint64_t)t->m->elements + place,
+	struct tally_landing l = { slot_of(t, chain) * 2 * (uint64_t)t->m->element.n + place,
 	                           element_side, w };
 
-	tally_far_add(&t->far, &l, &t->err);
+	ff_tally_chains_add(&t->far, &l, &t->err);
 }
 
-void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
-               const double dir[3])
+void ff_tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
+                  const double dir[3])
 {
-	uint32_t ps = 2 * t->m->element_patch[element_side >> 1] + (element_side & 1);
+	uint32_t ps = 2 * t->m->element.patch[element_side >> 1] + (element_side & 1);
 	uint32_t place = t->places->place[element_side] & ~TALLY_APART;
 
 	if (chain)
@@ -155,7 +155,7 @@ void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
 		v3_mad(t->toward[ps], -w, dir, t->toward[ps]);
 }
 
-uint32_t tally_next(const struct tally *t, uint64_t place)
+uint32_t ff_tally_next(const struct tally *t, uint64_t place)
 {
 	if (place >> 12 >= t->words)
 		return UINT32_MAX;
@@ -175,7 +175,7 @@ uint32_t tally_next(const struct tally *t, uint64_t place)
 	return (uint32_t)(64 * word + (uint64_t)__builtin_ctzll(t->seen[word]));
 }
 
-double tally_counted(const struct tally *t, uint32_t place)
+double ff_tally_counted(const struct tally *t, uint32_t place)
 {
 	double n = 0;
 
@@ -184,38 +184,38 @@ double tally_counted(const struct tally *t, uint32_t place)
 	return n;
 }
 
-void tally_set(struct tally *t, uint32_t place, double w, double variance)
+void ff_tally_set(struct tally *t, uint32_t place, double w, double variance)
 {
 	memset(t->count[place], 0, sizeof t->count[place]);
 	t->dense[place] = w;
-	t->variance[tally_side_at(t, place)] += variance;
-	tally_see(t, place);
+	t->variance[ff_tally_side_at(t, place)] += variance;
+	ff_tally_see(t, place);
 }
 
-uint32_t tally_side_at(const struct tally *t, uint32_t place)
+uint32_t ff_tally_side_at(const struct tally *t, uint32_t place)
 {
 	uint32_t column = t->places->column[place];
 
-	return 2 * t->m->element_patch[column >> 1] + (column & 1);
+	return 2 * t->m->element.patch[column >> 1] + (column & 1);
 }
 
-uint32_t tally_side_end(const struct tally *t, uint32_t ps)
+uint32_t ff_tally_side_end(const struct tally *t, uint32_t ps)
 {
-	const uint32_t *start = &t->m->patch_start[ps >> 1];
+	const uint32_t *start = &t->m->patch.start[ps >> 1];
 
 	return ps & 1 ? 2 * start[1] : start[0] + start[1];
 }
 
-void tally_replicate(struct tally *t)
+void ff_tally_replicate(struct tally *t)
 {
-	double escape = tally_rest(t, 0)->escape, now = escape - t->escape_before;
-	uint32_t place = tally_next(t, 0);
+	double escape = ff_tally_rest(t, 0)->escape, now = escape - t->escape_before;
+	uint32_t place = ff_tally_next(t, 0);
 
 	while (t->weighed && place != UINT32_MAX) {
-		uint32_t ps = tally_side_at(t, place);
+		uint32_t ps = ff_tally_side_at(t, place);
 		t->square[ps] += t->replicate[ps] * t->replicate[ps];
 		t->replicate[ps] = 0;
-		place = tally_next(t, tally_side_end(t, ps));
+		place = ff_tally_next(t, ff_tally_side_end(t, ps));
 	}
 	t->escape_square += now * now;
 	t->escape_before = escape;
@@ -244,8 +244,8 @@ static int put_arrival(struct ff_batch *b, uint32_t target, const double toward[
 
 	for (int k = 0; k < 3 && l > 0; k++)
 		f[k] = (float)(toward[k] / l);
-	return vec_append(&b->arrival_target, &target, 1, sizeof target, e) ||
-	       vec_append(&b->arrival_direction, f, 3, sizeof *f, e) ? -1 : 0;
+	return mem_append(&b->arrival_target, &target, 1, sizeof target, e) ||
+	       mem_append(&b->arrival_direction, f, 3, sizeof *f, e) ? -1 : 0;
 }
 
 /* What a row adds up to. */
@@ -260,17 +260,17 @@ struct finish {
 static int finish_side(struct tally *t, struct ff_batch *b, uint32_t ps, uint32_t place,
                        struct finish *f, struct err *e)
 {
-	uint32_t end = tally_side_end(t, ps);
+	uint32_t end = ff_tally_side_end(t, ps);
 	double part[TALLY_REPLICATES] = { 0 }, side_sum = 0, square = t->square[ps];
 
-	if (batch_reserve(b, end - place, e))
+	if (ff_batch_reserve(b, end - place, e))
 		return -1;
-	for (; place < end; place = tally_next(t, (uint64_t)place + 1)) {
-		double w = t->dense[place] + tally_counted(t, place);
+	for (; place < end; place = ff_tally_next(t, (uint64_t)place + 1)) {
+		double w = t->dense[place] + ff_tally_counted(t, place);
 		for (int r = 0; r < TALLY_REPLICATES; r++)
 			part[r] += t->count[place][r];
 		if (w > 0)
-			f->sum += batch_put_value(b, t->places->column[place], w);
+			f->sum += ff_batch_put_value(b, t->places->column[place], w);
 		side_sum += w;
 		t->dense[place] = 0;
 		memset(t->count[place], 0, sizeof t->count[place]);
@@ -290,13 +290,13 @@ static int finish_side(struct tally *t, struct ff_batch *b, uint32_t ps, uint32_
 
 static int finish_near(struct tally *t, struct ff_batch *b, struct finish *f, struct err *e)
 {
-	uint32_t place = tally_next(t, 0);
+	uint32_t place = ff_tally_next(t, 0);
 
 	while (place != UINT32_MAX) {
-		uint32_t ps = tally_side_at(t, place);
+		uint32_t ps = ff_tally_side_at(t, place);
 		if (finish_side(t, b, ps, place, f, e))
 			return -1;
-		place = tally_next(t, tally_side_end(t, ps));
+		place = ff_tally_next(t, ff_tally_side_end(t, ps));
 	}
 	for (size_t word = 0; word < t->words; word++) {
 		for (uint64_t left = t->words_seen[word]; left; left &= left - 1)
@@ -344,17 +344,17 @@ static int put_block(struct tally *t, struct ff_batch *b, uint32_t slot, struct 
 	const struct tally_rest *r = (const struct tally_rest *)t->rest.data + slot;
 
 	return put_arrivals(t, b, slot, e) ||
-	       batch_put_block(b, ((const uint32_t *)t->slot_chain.data)[slot], r, e) ? -1 : 0;
+	       ff_batch_put_block(b, ((const uint32_t *)t->slot_chain.data)[slot], r, e) ? -1 : 0;
 }
 
-int chains_compare(const struct chains *c, uint32_t a, uint32_t b)
+int ff_chains_compare(const struct chains *c, uint32_t a, uint32_t b)
 {
-	uint32_t la = chains_length(c, a), lb = chains_length(c, b);
+	uint32_t la = bsdf_chains_length(c, a), lb = bsdf_chains_length(c, b);
 
 	if (la != lb)
 		return la < lb ? -1 : 1;
 	for (uint32_t i = 0; i < c->events; i++) {
-		uint32_t x = chains_count(c, a)[i], y = chains_count(c, b)[i];
+		uint32_t x = bsdf_chains_count(c, a)[i], y = bsdf_chains_count(c, b)[i];
 		if (x != y)
 			return x < y ? -1 : 1;
 	}
@@ -369,15 +369,15 @@ struct slot_order {
 static int by_chain(const void *a, const void *b)
 {
 	const struct slot_order *x = a, *y = b;
-	return chains_compare(x->chains, x->chain, y->chain);
+	return ff_chains_compare(x->chains, x->chain, y->chain);
 }
 
 /* Blocks of chains beyond 0, in an order that does not depend on their numbers. */
 static int finish_far(struct tally *t, struct ff_batch *b, struct err *e)
 {
-	size_t slots = t->rest.n, total = 2 * t->m->elements;
+	size_t slots = t->rest.n, total = 2 * t->m->element.n;
 	struct slot_order *order = mem_new(slots, sizeof *order, "row blocks", e);
-	int bad = !order || tally_far_merge(&t->far, e);
+	int bad = !order || ff_tally_chains_merge(&t->far, e);
 	const struct tally_landing *l = t->far.list.data;
 
 	for (uint32_t s = 1; !bad && s < slots; s++)
@@ -387,10 +387,10 @@ static int finish_far(struct tally *t, struct ff_batch *b, struct err *e)
 		qsort(order + 1, slots - 1, sizeof *order, by_chain);
 	for (size_t k = 1; !bad && k < slots; k++) {
 		uint64_t begin = order[k].slot * (uint64_t)total, end = begin + total;
-		size_t i = tally_far_find(&t->far, begin);
+		size_t i = ff_tally_chains_find(&t->far, begin);
 		for (; !bad && i < t->far.list.n && l[i].key < end; i++)
-			if (!(bad = batch_reserve(b, 1, e)))
-				batch_put_value(b, l[i].column, l[i].w);
+			if (!(bad = ff_batch_reserve(b, 1, e)))
+				ff_batch_put_value(b, l[i].column, l[i].w);
 		bad = bad || put_block(t, b, order[k].slot, e);
 	}
 	free(order);
@@ -409,15 +409,15 @@ static void clear(struct tally *t)
 	slot_of(t, 0);
 }
 
-int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
-                 enum ff_row_kind kind, uint32_t samples, double total, struct err *e)
+int ff_tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
+                    enum ff_row_kind kind, uint32_t samples, double total, struct err *e)
 {
-	struct tally_rest *r = tally_rest(t, 0);
+	struct tally_rest *r = ff_tally_rest(t, 0);
 	struct finish f = { .samples = samples, .total = total };
 
 	if (t->err.set)
 		return err_set(e, "%s", t->err.text);
-	if (batch_begin(b, e) || finish_near(t, b, &f, e))
+	if (ff_batch_begin(b, e) || finish_near(t, b, &f, e))
 		return -1;
 	f.even += r->escape / total * (1 - r->escape / total);
 	f.variance += share_variance(t, r->escape, t->escape_square, total, samples);
@@ -431,7 +431,7 @@ int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
 	if (t->dependent && t->replicates >= 2 && f.variance > 0)
 		samples = (uint32_t)fmax(1, fmin(samples, f.even / f.variance));
 	clear(t);
-	struct batch_row row = { row_side, kind, samples, f.sum > 0 ? 1 / f.sum : 0,
+	struct ff_batch_row row = { row_side, kind, samples, f.sum > 0 ? 1 / f.sum : 0,
 	                         1 - f.sum / total, error };
-	return batch_put_row(b, &row, e);
+	return ff_batch_put_row(b, &row, e);
 }

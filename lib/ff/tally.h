@@ -39,14 +39,14 @@ struct tally {
 	int weighed;               /* any other weights */
 	double *replicate;         /* [2P] other weights, the current replicate */
 	double *square;            /* [2P] their sums of squares over replicates */
-	double *variance;          /* [2P] of the summed weight, where tally_set gave it */
+	double *variance;          /* [2P] of the summed weight, where ff_tally_set gave it */
 	double (*toward)[3];       /* [2P] summed directions to where light comes from */
 	double escape_before, escape_square;
 	int replicates;
 	int dependent;             /* samples of a replicate are no independent ones */
 
-	struct tally_far far;      /* longer chains */
-	struct vec rest;           /* struct tally_rest by slot */
+	struct tally_chains far;      /* longer chains */
+	struct vec rest;           /* struct ff_tally_rest by slot */
 	struct tally_rest spill;   /* takes what comes after running out of memory */
 	struct vec slot_chain;     /* uint32_t chain by slot; slot 0 = chain 0 */
 	struct vec chain_slot;     /* uint32_t 1 + slot by chain, 0 = unused */
@@ -65,65 +65,65 @@ struct ff_batch {
 };
 
 /* O(elements). Marks the element-sides of patch-sides with apart[] set. */
-int tally_places_init(struct tally_places *p, const struct model *m, const uint8_t *apart,
-                      struct err *e);
-void tally_places_free(struct tally_places *p);
+int ff_tally_places_init(struct tally_places *p, const struct model *m, const uint8_t *apart,
+                         struct err *e);
+void ff_tally_places_free(struct tally_places *p);
 
 /* chain_most: see chain.h. */
-int tally_init(struct tally *t, const struct model *m, const struct tally_places *places,
-               const uint8_t *has_lobe, uint32_t chain_most, struct err *e);
-void tally_free(struct tally *t);
+int ff_tally_init(struct tally *t, const struct model *m, const struct tally_places *places,
+                  const uint8_t *has_lobe, uint32_t chain_most, struct err *e);
+void ff_tally_free(struct tally *t);
 
-static inline void tally_see(struct tally *t, uint32_t place)
+static inline void ff_tally_see(struct tally *t, uint32_t place)
 {
 	t->seen[place >> 6] |= (uint64_t)1 << (place & 63);
 	t->words_seen[place >> 12] |= (uint64_t)1 << (place >> 6 & 63);
 }
 
 /* A landing of weight 1 by chain 0 at a place without a lobe. */
-static inline void tally_count(struct tally *t, uint32_t place)
+static inline void ff_tally_count(struct tally *t, uint32_t place)
 {
 	int r = t->replicates < TALLY_REPLICATES ? t->replicates : TALLY_REPLICATES - 1;
 
 	t->count[place][r]++;
-	tally_see(t, place);
+	ff_tally_see(t, place);
 }
 
 /* Weight w of the row's flux arriving by `chain` on an element-side, travelling
  * along dir (unit). */
-void tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
-               const double dir[3]);
+void ff_tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double w,
+                  const double dir[3]);
 
 /* What became of flux of `chain` that lands nowhere. The pointer is good until
  * the next call with a chain not seen in this row. */
-struct tally_rest *tally_rest(struct tally *t, uint32_t chain);
+struct tally_rest *ff_tally_rest(struct tally *t, uint32_t chain);
 
 /* The first place seen in chain 0 at or after `place`, or UINT32_MAX; the patch-side of
  * a place, and the place after its last. */
-uint32_t tally_next(const struct tally *t, uint64_t place);
-uint32_t tally_side_at(const struct tally *t, uint32_t place);
-uint32_t tally_side_end(const struct tally *t, uint32_t patch_side);
+uint32_t ff_tally_next(const struct tally *t, uint64_t place);
+uint32_t ff_tally_side_at(const struct tally *t, uint32_t place);
+uint32_t ff_tally_side_end(const struct tally *t, uint32_t patch_side);
 
 /* Landings of weight 1 tallied at a place. */
-double tally_counted(const struct tally *t, uint32_t place);
+double ff_tally_counted(const struct tally *t, uint32_t place);
 
 /* Makes w, of that variance, the weight at a place in chain 0. */
-void tally_set(struct tally *t, uint32_t place, double w, double variance);
+void ff_tally_set(struct tally *t, uint32_t place, double w, double variance);
 
 /* Closes a replicate: equal, independently scrambled parts of a row's samples,
  * whose spread gives the row's standard error. */
-void tally_replicate(struct tally *t);
+void ff_tally_replicate(struct tally *t);
 
 /* Appends the row to the batch and clears the tally. total: the weight that was
  * cast, from which the raw residual follows. The standard error comes from the
  * replicates where there are two or more, otherwise it is that of `samples`
  * random samples; none (0) stands for exact values. The row says that it is worth `samples`,
  * or with t->dependent as many independent ones, if fewer, as have that error. O(hits + log). 0, or -1 and e. */
-int tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
-                 enum ff_row_kind kind, uint32_t samples, double total, struct err *e);
+int ff_tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
+                    enum ff_row_kind kind, uint32_t samples, double total, struct err *e);
 
 /* What a row says beside its blocks: as struct ff has it. */
-struct batch_row {
+struct ff_batch_row {
 	uint32_t side;
 	enum ff_row_kind kind;
 	uint32_t samples;
@@ -131,31 +131,31 @@ struct batch_row {
 };
 
 /* A row is put piece by piece: begin, then for each block its values into reserved room and
- * its arrivals, then the block, last the row. 0, or -1 and e; batch_put_value returns the
+ * its arrivals, then the block, last the row. 0, or -1 and e; ff_batch_put_value returns the
  * value as it is stored. */
-int batch_begin(struct ff_batch *b, struct err *e);
-int batch_reserve(struct ff_batch *b, size_t values, struct err *e);
-double batch_put_value(struct ff_batch *b, uint32_t column, double value);
+int ff_batch_begin(struct ff_batch *b, struct err *e);
+int ff_batch_reserve(struct ff_batch *b, size_t values, struct err *e);
+double ff_batch_put_value(struct ff_batch *b, uint32_t column, double value);
 
 /* The same for those of n values x (double, or float unless b->f64) that are above 0, times
  * `scale`; returns the sum of what is stored. */
-double batch_put_values(struct ff_batch *b, const uint32_t *column, const void *x, size_t n,
-                        double scale);
-int batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *rest,
-                    struct err *e);
-int batch_put_row(struct ff_batch *b, const struct batch_row *r, struct err *e);
+double ff_batch_put_values(struct ff_batch *b, const uint32_t *column, const void *x, size_t n,
+                           double scale);
+int ff_batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *rest,
+                       struct err *e);
+int ff_batch_put_row(struct ff_batch *b, const struct ff_batch_row *r, struct err *e);
 
 /* Chain numbers of the batch and order of links: local -> whole. `map` (vec of
  * uint32_t, CHAIN_NONE = not met yet) belongs to the thread whose chains these
  * are. Called in row order, so numbers do not depend on threads. */
-int batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *map,
-                   struct chains *whole, struct err *e);
+int ff_batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *map,
+                      struct chains *whole, struct err *e);
 
 /* The batch seen as a struct ff (borrowed arrays). */
-struct ff batch_view(const struct ff_batch *b);
-void batch_free(struct ff_batch *b);
+struct ff ff_batch_view(const struct ff_batch *b);
+void ff_batch_free(struct ff_batch *b);
 
 /* Order of chains by length, then counts: independent of their numbers. */
-int chains_compare(const struct chains *c, uint32_t a, uint32_t b);
+int ff_chains_compare(const struct chains *c, uint32_t a, uint32_t b);
 
 #endif

@@ -4,21 +4,21 @@
 
 enum { FAR_MOST = 1 << 20 }; /* landings kept before equal ones are added up */
 
-void tally_far_free(struct tally_far *f)
+void ff_tally_chains_free(struct tally_chains *f)
 {
 	free(f->list.data);
 	free(f->sort.data);
-	*f = (struct tally_far){ 0 };
+	*f = (struct tally_chains){ 0 };
 }
 
 /* Least-significant-digit radix sort by key, 11 bits a pass; stable. */
-static int sort_far(struct tally_far *f, struct err *e)
+static int sort_far(struct tally_chains *f, struct err *e)
 {
 	size_t n = f->list.n;
 	uint64_t all = 0;
 
 	f->sort.n = 0;
-	if (vec_reserve(&f->sort, n, sizeof(struct tally_landing), e))
+	if (mem_reserve(&f->sort, n, sizeof(struct tally_landing), e))
 		return -1;
 	struct tally_landing *from = f->list.data, *to = f->sort.data;
 	for (size_t i = 0; i < n; i++)
@@ -47,7 +47,7 @@ static int sort_far(struct tally_far *f, struct err *e)
 	return 0;
 }
 
-int tally_far_merge(struct tally_far *f, struct err *e)
+int ff_tally_chains_merge(struct tally_chains *f, struct err *e)
 {
 	size_t n = 0;
 
@@ -64,19 +64,19 @@ int tally_far_merge(struct tally_far *f, struct err *e)
 	return 0;
 }
 
-int tally_far_add(struct tally_far *f, const struct tally_landing *l, struct err *e)
+int ff_tally_chains_add(struct tally_chains *f, const struct tally_landing *l, struct err *e)
 {
-	if (vec_append(&f->list, l, 1, sizeof *l, e))
+	if (mem_append(&f->list, l, 1, sizeof *l, e))
 		return -1;
 	if (f->list.n < (f->most ? f->most : FAR_MOST))
 		return 0;
-	if (tally_far_merge(f, e))
+	if (ff_tally_chains_merge(f, e))
 		return -1;
 	f->most = f->list.n > FAR_MOST / 2 ? 2 * f->list.n : FAR_MOST;
 	return 0;
 }
 
-size_t tally_far_find(const struct tally_far *f, uint64_t key)
+size_t ff_tally_chains_find(const struct tally_chains *f, uint64_t key)
 {
 	const struct tally_landing *l = f->list.data;
 	size_t i = 0, hi = f->list.n;

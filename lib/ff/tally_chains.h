@@ -1,5 +1,5 @@
 /* Landings by chains longer than 0, sparse: kept as a list and added up now and then
- * (private to lib/ff_*.c). */
+ * (private to lib/ff). */
 #ifndef TWOPASS_TALLY_CHAINS_H
 #define TWOPASS_TALLY_CHAINS_H
 
@@ -13,23 +13,23 @@ struct tally_landing {
 	double w;
 };
 
-struct tally_far {
+struct tally_chains {
 	struct vec list;           /* struct tally_landing */
 	struct vec sort;           /* scratch for sorting them */
 	size_t most;               /* when to add up equal ones */
 };
 
-/* Begin with {0}; release with tally_far_free. */
-void tally_far_free(struct tally_far *f);
+/* Begin with {0}; release with ff_tally_chains_free. */
+void ff_tally_chains_free(struct tally_chains *f);
 
 /* O(1) on the whole. 0, or -1 and e. */
-int tally_far_add(struct tally_far *f, const struct tally_landing *l, struct err *e);
+int ff_tally_chains_add(struct tally_chains *f, const struct tally_landing *l, struct err *e);
 
 /* Sorts by key and adds up equal ones: light that goes round between mirrors lands on the
  * same elements again and again. O(landings). 0, or -1 and e. */
-int tally_far_merge(struct tally_far *f, struct err *e);
+int ff_tally_chains_merge(struct tally_chains *f, struct err *e);
 
 /* Of merged landings, the first whose key is not below `key`: its index, or their number. */
-size_t tally_far_find(const struct tally_far *f, uint64_t key);
+size_t ff_tally_chains_find(const struct tally_chains *f, uint64_t key);
 
 #endif

@@ -12,7 +12,7 @@ struct place {
 	uint32_t triangle;
 };
 
-struct box triangle_box(const double *vertex, const uint32_t *corner)
+struct box geo_triangle_box(const double *vertex, const uint32_t *corner)
 {
 	struct box b;
 
@@ -60,12 +60,12 @@ static int sort_triangles(struct boxes *b, struct err *e)
 		return -1;
 	for (size_t t = 1; t < b->n; t++)
 		grow(&all, &b->box[t]);
-	struct curve c = curve_of(all.lo, all.hi);
+	struct morton_curve c = geo_morton_curve(all.lo, all.hi);
 	for (size_t t = 0; t < b->n; t++) {
 		double x[3];
 		for (int k = 0; k < 3; k++)
 			x[k] = .5 * (b->box[t].lo[k] + b->box[t].hi[k]) - c.centre[k];
-		place[t] = (struct place){ morton(&c, x), (uint32_t)t };
+		place[t] = (struct place){ geo_morton(&c, x), (uint32_t)t };
 	}
 	qsort(place, b->n, sizeof *place, compare_places);
 	for (size_t t = 0; t < b->n; t++)
@@ -99,8 +99,8 @@ static void add_nodes(struct boxes *b, uint32_t begin, uint32_t end)
 	mine->next = (uint32_t)b->nodes;
 }
 
-int boxes_build(struct boxes *b, const double *vertex, const uint32_t *triangle, size_t n,
-                struct err *e)
+int geo_boxes_build(struct boxes *b, const double *vertex, const uint32_t *triangle, size_t n,
+                    struct err *e)
 {
 	*b = (struct boxes){ .n = n };
 	b->order = mem_new(n, sizeof *b->order, "boxes", e);
@@ -109,7 +109,7 @@ int boxes_build(struct boxes *b, const double *vertex, const uint32_t *triangle,
 	if (!b->order || !b->box || !b->node)
 		return -1;
 	for (size_t t = 0; t < n; t++)
-		b->box[t] = triangle_box(vertex, &triangle[3 * t]);
+		b->box[t] = geo_triangle_box(vertex, &triangle[3 * t]);
 	if (sort_triangles(b, e))
 		return -1;
 	if (n)
@@ -117,7 +117,7 @@ int boxes_build(struct boxes *b, const double *vertex, const uint32_t *triangle,
 	return 0;
 }
 
-void boxes_free(struct boxes *b)
+void geo_boxes_free(struct boxes *b)
 {
 	free(b->order);
 	free(b->box);
@@ -125,8 +125,8 @@ void boxes_free(struct boxes *b)
 	*b = (struct boxes){ 0 };
 }
 
-int boxes_find(const struct boxes *b, const struct box *near, double margin,
-               struct vec *found, struct err *e)
+int geo_boxes_find(const struct boxes *b, const struct box *near, double margin,
+                   struct vec *found, struct err *e)
 {
 	struct box wide = *near;
 
@@ -143,7 +143,7 @@ int boxes_find(const struct boxes *b, const struct box *near, double margin,
 		if (node->next == ++at)
 			for (uint32_t i = node->begin; i < node->end; i++)
 				if (overlap(&b->box[b->order[i]], &wide) &&
-				    vec_append(found, &b->order[i], 1, sizeof *b->order, e))
+				    mem_append(found, &b->order[i], 1, sizeof *b->order, e))
 					return -1;
 	}
 	return 0;

@@ -28,16 +28,16 @@ struct boxes {
 };
 
 /* The box of a triangle's corners (rows of vertex). */
-struct box triangle_box(const double *vertex, const uint32_t *corner);
+struct box geo_triangle_box(const double *vertex, const uint32_t *corner);
 
 /* O(n log n). 0, or -1 and e; to be freed in any case. */
-int boxes_build(struct boxes *b, const double *vertex, const uint32_t *triangle, size_t n,
-                struct err *e);
-void boxes_free(struct boxes *b);
+int geo_boxes_build(struct boxes *b, const double *vertex, const uint32_t *triangle, size_t n,
+                    struct err *e);
+void geo_boxes_free(struct boxes *b);
 
 /* Appends (uint32_t) the triangles whose boxes come within `margin` of `near`.
  * O(log n + found) for well-shaped triangles. 0, or -1 and e. */
-int boxes_find(const struct boxes *b, const struct box *near, double margin,
-               struct vec *found, struct err *e);
+int geo_boxes_find(const struct boxes *b, const struct box *near, double margin,
+                   struct vec *found, struct err *e);
 
 #endif

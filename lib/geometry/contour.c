@@ -7,12 +7,12 @@
 
 enum { DEEPEST = 48 };        /* bisections of an edge, towards a corner it nearly meets */
 
-double contour_point(const double x[3], const double normal[3], int n, const double *v)
+double geo_contour_point(const double x[3], const double normal[3], int n, const double *v)
 {
-	struct eye_polygon p;
+	struct point_polygon p;
 
-	eye_polygon_make(&p, x, n, v);
-	return eye_polygon_factor(&p, normal);
+	geo_point_polygon_make(&p, x, n, v);
+	return geo_point_polygon_factor(&p, normal);
 }
 
 /* ---- the integral of ln r over a pair of edges ---- */
@@ -149,7 +149,7 @@ static void make_edge(const struct facet *p, int i, const double origin[3], doub
 	e->length = v3_normalise(e->t);
 }
 
-double contour_exchange(const struct facet *p, const struct facet *q)
+double geo_contour_exchange(const struct facet *p, const struct facet *q)
 {
 	double sum = 0, unit = p->radius + q->radius;
 	struct edge e, f;

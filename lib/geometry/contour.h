@@ -7,8 +7,8 @@
 #include "lib/geometry/facet.h"
 
 /* Form factor from a surface element at x with a unit normal to a polygon with nothing
- * between: see eye_polygon_factor(). v: [n][3]. */
-double contour_point(const double x[3], const double normal[3], int n, const double *v);
+ * between: see geo_point_polygon_factor(). v: [n][3]. */
+double geo_contour_point(const double x[3], const double normal[3], int n, const double *v);
 
 /* Exchange area A_p F_pq = A_q F_qp, m^2, of two convex facets that lie in front of
  * one another with nothing between, as (1 / 2 pi) times the double contour integral of
@@ -16,6 +16,6 @@ double contour_point(const double x[3], const double normal[3], int n, const dou
  * integrated in closed form, others by adaptive Gauss-Kronrod quadrature of the closed
  * inner integral. Absolute error about 1e-15 times the product of the perimeters.
  * O(corners p x corners q). */
-double contour_exchange(const struct facet *p, const struct facet *q);
+double geo_contour_exchange(const struct facet *p, const struct facet *q);
 
 #endif

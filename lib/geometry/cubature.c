@@ -28,7 +28,7 @@ static int cuts(int corners)
 	return (corners - 1) / 2;
 }
 
-int cubature_points(int corners, int level)
+int geo_cubature_points(int corners, int level)
 {
 	return cuts(corners) * level_points[level];
 }
@@ -130,7 +130,7 @@ static void square_points(const double *const q[4], struct cubature *c)
 	put(c, x, 0);
 }
 
-void cubature_fill(const struct facet *f, int level, struct cubature *c)
+void geo_cubature_fill(const struct facet *f, int level, struct cubature *c)
 {
 	c->n = 0;
 	for (int i = 0; i < cuts(f->n); i++) {
@@ -177,8 +177,8 @@ static four seen_from(const struct cubature *from, int i, const struct cubature 
 	return sum;
 }
 
-double cubature_exchange(const struct facet *a, const struct cubature *ca,
-                         const struct facet *b, const struct cubature *cb)
+double geo_cubature_exchange(const struct facet *a, const struct cubature *ca,
+                             const struct facet *b, const struct cubature *cb)
 {
 	double height[FACET_CORNERS * 18];
 	four sum = { 0 };
@@ -206,7 +206,7 @@ static const struct {
 	double factor, power;
 } level_error[CUBATURE_LEVELS] = { { 16, 4 }, { 8, 6 }, { 2, 8 }, { .04, 12 } };
 
-void cubature_reach(double tolerance, double reach[CUBATURE_LEVELS])
+void geo_cubature_reach(double tolerance, double reach[CUBATURE_LEVELS])
 {
 	for (int l = 0; l < CUBATURE_LEVELS; l++)
 		reach[l] = pow(level_error[l].factor / tolerance, 1 / level_error[l].power);

@@ -19,21 +19,21 @@ struct cubature {
 
 /* Points that a facet of `corners` corners has at a level: 4, 8, 16 or 36 for each of
  * the triangle or the quadrilaterals it is cut into. */
-int cubature_points(int corners, int level);
+int geo_cubature_points(int corners, int level);
 
-/* Fills c (room for cubature_points doubles in each array) for a facet.
+/* Fills c (room for geo_cubature_points doubles in each array) for a facet.
  * Levels 0, 2, 3: products of 2, 4, 6 Gauss-Legendre points on a bilinear map, but 3
  * points of degree 2 on a triangle at level 0; level 1: Radon's 7 points of degree 5
  * (triangles; quadrilaterals). Stroud 1971. */
-void cubature_fill(const struct facet *f, int level, struct cubature *c);
+void geo_cubature_fill(const struct facet *f, int level, struct cubature *c);
 
 /* Exchange area, m^2, of two facets in front of one another. O(points a x points b). */
-double cubature_exchange(const struct facet *a, const struct cubature *ca,
-                         const struct facet *b, const struct cubature *cb);
+double geo_cubature_exchange(const struct facet *a, const struct cubature *ca,
+                             const struct facet *b, const struct cubature *cb);
 
 /* reach[l]: a facet of radius r may be represented by its points of level l, with a
  * relative error below `tolerance`, for another whose nearest corner may be at a
  * distance of reach[l] r from its centre. Level 0: quadrilaterals only. */
-void cubature_reach(double tolerance, double reach[CUBATURE_LEVELS]);
+void geo_cubature_reach(double tolerance, double reach[CUBATURE_LEVELS]);
 
 #endif

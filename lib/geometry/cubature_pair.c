@@ -32,12 +32,12 @@ static void find_centroid(const struct facet *f, double x[3])
 	}
 }
 
-void joint_fill(const struct facet *f, struct joint *j)
+void geo_pair_fill(const struct facet *f, struct cubature_pair *j)
 {
 	const double corner = sqrt(c2), edge = sqrt(e2);
 	double skew[3];
 
-	*j = (struct joint){ .skew = INFINITY };
+	*j = (struct cubature_pair){ .skew = INFINITY };
 	if (f->n != 4)
 		return;
 	find_centroid(f, j->centroid);
@@ -59,8 +59,8 @@ void joint_fill(const struct facet *f, struct joint *j)
  * parallelograms of radii in ratios to 100, most of them touching the other's plane, it
  * stayed below .85 of .75 r^6 + .15 r^5 d (ra / hb + rb / ha) + .025 r^4 d^2 ra rb / (ha hb),
  * by d^6; r d is below 6 r^2 + d^2 / 24. What is skew errs by its second moments. */
-int joint_reaches(const struct facet *a, const struct joint *ja, const struct facet *b,
-                  const struct joint *jb, double tolerance)
+int geo_pair_reaches(const struct facet *a, const struct cubature_pair *ja, const struct facet *b,
+                     const struct cubature_pair *jb, double tolerance)
 {
 	double r = a->radius + b->radius, s = r * r, d[3];
 	double ha = v3_dot(a->normal, b->centre) - a->offset;
@@ -89,8 +89,8 @@ static four r4(const double (*x)[4], double px, double py, double pz)
 	return r2 * r2;
 }
 
-double joint_exchange(const struct facet *a, const struct joint *ja, const struct facet *b,
-                      const struct joint *jb)
+double geo_pair_exchange(const struct facet *a, const struct cubature_pair *ja, const struct facet *b,
+                         const struct cubature_pair *jb)
 {
 	const double *ca = ja->centroid, *cb = jb->centroid;
 	four of_b = heights(a, jb->corner), of_a = heights(b, ja->corner), p[4];
@@ -113,10 +113,10 @@ double joint_exchange(const struct facet *a, const struct joint *ja, const struc
 enum { NORMAL = 0, OFFSET = 3, CENTRE = 4, RADIUS = 7, AREA = 8, SKEW = 9, CENTROID = 10,
        CORNER = 13, EDGE = 25, ROWS = 37 };
 
-int joint_table_new(const struct facet *f, const struct joint *j, size_t n, double tolerance,
-                    double near, struct joint_table *t, struct err *e)
+int geo_pair_table_new(const struct facet *f, const struct cubature_pair *j, size_t n, double tolerance,
+                       double near, struct cubature_pair_table *t, struct err *e)
 {
-	*t = (struct joint_table){ .n = n, .tolerance = tolerance, .near = near };
+	*t = (struct cubature_pair_table){ .n = n, .tolerance = tolerance, .near = near };
 	if (n > SIZE_MAX - 3 || !(t->row = mem_new(n + 3, ROWS * sizeof *t->row, "facets", e)))
 		return -1;
 	for (size_t i = 0; i < n; i++) {
@@ -137,10 +137,10 @@ int joint_table_new(const struct facet *f, const struct joint *j, size_t n, doub
 	return 0;
 }
 
-void joint_table_free(struct joint_table *t)
+void geo_pair_table_free(struct cubature_pair_table *t)
 {
 	free(t->row);
-	*t = (struct joint_table){ 0 };
+	*t = (struct cubature_pair_table){ 0 };
 }
 
 /* Four facets: of a table, or one of it four times. */
@@ -192,7 +192,7 @@ static inline four sum_from(const struct quad *q, size_t points, const four h[4]
 	return (h[0] * p[1] + h[1] * p[0]) / (p[0] * p[1]) + (h[2] * p[3] + h[3] * p[2]) / (p[2] * p[3]);
 }
 
-/* joint_reaches, for facets wholly in front of one another. */
+/* geo_pair_reaches, for facets wholly in front of one another. */
 static four_mask quad_reaches(const struct quad *a, const struct quad *b, four ha, four hb,
                               double tolerance)
 {
@@ -244,17 +244,17 @@ static four quad_exchange(const struct quad *a, const struct quad *b)
 	return number(a, AREA) * number(b, AREA) * (corner_weight * corners + edge_weight * edges) * (1 / PI);
 }
 
-void joint_one(const struct joint_table *t, size_t i, double one[JOINT_ONE])
+void geo_pair_one(const struct cubature_pair_table *t, size_t i, double one[PAIR_ONE])
 {
-	static_assert((int)JOINT_ONE == 4 * ROWS, "JOINT_ONE");
+	static_assert((int)PAIR_ONE == 4 * ROWS, "PAIR_ONE");
 
 	for (size_t row = 0; row < ROWS; row++)
 		for (size_t k = 0; k < 4; k++)
 			one[4 * row + k] = t->row[row * (t->n + 3) + i];
 }
 
-int joint_four(const struct joint_table *t, const double one[JOINT_ONE], size_t j, int swap,
-               double x[4])
+int geo_pair_four(const struct cubature_pair_table *t, const double one[PAIR_ONE], size_t j, int swap,
+                  double x[4])
 {
 	const struct quad same = { one, 4 }, other = { t->row + j, t->n + 3 };
 	const struct quad *a = swap ? &other : &same, *b = swap ? &same : &other;

@@ -7,45 +7,45 @@
 #include "lib/geometry/facet.h"
 
 /* Points of a parallelogram by coordinate: its centroid, towards its corners, towards its edges. */
-struct joint {
+struct cubature_pair {
 	double skew;          /* how far corners are from a parallelogram's, by the radius */
 	double centroid[3], corner[3][4], edge[3][4];
 };
 
 /* j->skew is INFINITY where the facet has not four corners. */
-void joint_fill(const struct facet *f, struct joint *j);
+void geo_pair_fill(const struct facet *f, struct cubature_pair *j);
 
 /* 1 if the rule's relative error for two facets in front of one another is below
  * `tolerance`. */
-int joint_reaches(const struct facet *a, const struct joint *ja, const struct facet *b,
-                  const struct joint *jb, double tolerance);
+int geo_pair_reaches(const struct facet *a, const struct cubature_pair *ja, const struct facet *b,
+                     const struct cubature_pair *jb, double tolerance);
 
 /* Exchange area, m^2, of two parallelograms in front of one another. */
-double joint_exchange(const struct facet *a, const struct joint *ja, const struct facet *b,
-                      const struct joint *jb);
+double geo_pair_exchange(const struct facet *a, const struct cubature_pair *ja, const struct facet *b,
+                         const struct cubature_pair *jb);
 
 /* Facets by number, so that one can be paired with four that follow one another at a time. */
-struct joint_table {
+struct cubature_pair_table {
 	size_t n;
 	double tolerance;     /* relative error of exchange areas */
 	double near;          /* what is not further in front of a facet sees none of it */
-	double *row;          /* [JOINT_ONE / 4][n + 3] */
+	double *row;          /* [PAIR_ONE / 4][n + 3] */
 };
 
-enum { JOINT_ONE = 148 };
+enum { PAIR_ONE = 148 };
 
-int joint_table_new(const struct facet *f, const struct joint *j, size_t n, double tolerance,
-                    double near, struct joint_table *t, struct err *e);
-void joint_table_free(struct joint_table *t);
+int geo_pair_table_new(const struct facet *f, const struct cubature_pair *j, size_t n, double tolerance,
+                       double near, struct cubature_pair_table *t, struct err *e);
+void geo_pair_table_free(struct cubature_pair_table *t);
 
-/* Facet i of the table as joint_four takes it. */
-void joint_one(const struct joint_table *t, size_t i, double one[JOINT_ONE]);
+/* Facet i of the table as geo_pair_four takes it. */
+void geo_pair_one(const struct cubature_pair_table *t, size_t i, double one[PAIR_ONE]);
 
 /* Exchange areas, m^2, of a facet and facets j to j + 3 of the table, into x. Returns a bit for
  * each of them for which they hold: wholly in front of one another and within the rule's reach,
  * or one behind the other's plane (0). The facet is the first of each pair, with `swap` the
  * second: the sums are the same only for the same order. Past the table's end x means nothing. */
-int joint_four(const struct joint_table *t, const double one[JOINT_ONE], size_t j, int swap,
-               double x[4]);
+int geo_pair_four(const struct cubature_pair_table *t, const double one[PAIR_ONE], size_t j, int swap,
+                  double x[4]);
 
 #endif

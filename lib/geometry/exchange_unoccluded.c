@@ -3,10 +3,10 @@
 #include "lib/base/vec3.h"
 #include "lib/geometry/contour.h"
 
-void clear_init(struct clear *x, double relative)
+void geo_unoccluded_init(struct unoccluded *x, double relative)
 {
 	x->relative = relative;
-	cubature_reach(relative, x->reach);
+	geo_cubature_reach(relative, x->reach);
 }
 
 /* Distance of a point from a facet. */
@@ -30,7 +30,7 @@ static double distance(const double p[3], const struct facet *f)
 }
 
 /* The lowest level for a facet seen from a distance of `gap` around its centre. */
-static int level(const struct clear *x, const struct facet *f, double gap)
+static int level(const struct unoccluded *x, const struct facet *f, double gap)
 {
 	int l = f->n % 2 ? 1 : 0; /* level 0 is for quadrilaterals */
 
@@ -39,14 +39,14 @@ static int level(const struct clear *x, const struct facet *f, double gap)
 	return l;
 }
 
-static const struct cubature *points(struct clear *x, int which, const struct facet *f,
+static const struct cubature *points(struct unoccluded *x, int which, const struct facet *f,
                                      const struct cubature *stored, int l, struct cubature *room)
 {
 	if (stored && stored[l].n)
 		return &stored[l];
 	*room = (struct cubature){ 0, x->points[which][0], x->points[which][1],
 	                           x->points[which][2], x->points[which][3] };
-	cubature_fill(f, l, room);
+	geo_cubature_fill(f, l, room);
 	return room;
 }
 
@@ -58,31 +58,31 @@ static double lambert(const struct facet *a, const struct cubature *c, const str
 	for (int i = 0; i < c->n; i++) {
 		double at[3] = { c->x[i], c->y[i], c->z[i] };
 		if (c->w[i] > 0)
-			sum += c->w[i] * contour_point(at, a->normal, b->n, b->v);
+			sum += c->w[i] * geo_contour_point(at, a->normal, b->n, b->v);
 	}
 	return sum;
 }
 
-double clear_exchange(struct clear *x, const struct facet *a, struct clear_points pa,
-                      const struct facet *b, struct clear_points pb)
+double geo_unoccluded_exchange(struct unoccluded *x, const struct facet *a, struct unoccluded_points pa,
+                               const struct facet *b, struct unoccluded_points pb)
 {
 	struct cubature ra, rb;
 	double d[3];
 
-	if (pa.joint && pb.joint && joint_reaches(a, pa.joint, b, pb.joint, x->relative))
-		return joint_exchange(a, pa.joint, b, pb.joint);
+	if (pa.joint && pb.joint && geo_pair_reaches(a, pa.joint, b, pb.joint, x->relative))
+		return geo_pair_exchange(a, pa.joint, b, pb.joint);
 	v3_sub(b->centre, a->centre, d);
 	double apart = v3_length(d);
 	int la = level(x, a, apart - b->radius), lb = level(x, b, apart - a->radius);
 
 	if (la < CUBATURE_LEVELS && lb < CUBATURE_LEVELS) {
-		return cubature_exchange(a, points(x, 0, a, pa.level, la, &ra), b,
-		                         points(x, 1, b, pb.level, lb, &rb));
+		return geo_cubature_exchange(a, points(x, 0, a, pa.level, la, &ra), b,
+		                             points(x, 1, b, pb.level, lb, &rb));
 	}
 	/* A small facet close to a large one. */
 	const struct facet *small = a->radius < b->radius ? a : b, *large = small == a ? b : a;
 	int l = level(x, small, distance(small->centre, large));
 	if (l < CUBATURE_LEVELS - 1)
 		return lambert(small, points(x, 0, small, NULL, l, &ra), large);
-	return contour_exchange(a, b);
+	return geo_contour_exchange(a, b);
 }

@@ -9,22 +9,22 @@
 #include "lib/geometry/cubature_pair.h"
 
 /* Points of a facet that are kept: [CUBATURE_LEVELS], and its joint ones; or NULL. */
-struct clear_points {
+struct unoccluded_points {
 	const struct cubature *level;
-	const struct joint *joint;
+	const struct cubature_pair *joint;
 };
 
 /* One thread's scratch space and what accuracy asks for. */
-struct clear {
+struct unoccluded {
 	double relative, reach[CUBATURE_LEVELS];
 	double points[2][4][FACET_CORNERS * 18];
 };
 
 /* relative: error of exchange areas. */
-void clear_init(struct clear *c, double relative);
+void geo_unoccluded_init(struct unoccluded *c, double relative);
 
 /* Exchange area, m^2, of facets that lie in front of one another. */
-double clear_exchange(struct clear *c, const struct facet *a, struct clear_points pa,
-                      const struct facet *b, struct clear_points pb);
+double geo_unoccluded_exchange(struct unoccluded *c, const struct facet *a, struct unoccluded_points pa,
+                               const struct facet *b, struct unoccluded_points pb);
 
 #endif

@@ -31,7 +31,7 @@ static void spread(struct facet *f, double twice[3])
 	f->radius = sqrt(far);
 }
 
-void facet_measure(struct facet *f)
+void geo_facet_measure(struct facet *f)
 {
 	double sum = 0;
 
@@ -42,8 +42,8 @@ void facet_measure(struct facet *f)
 	f->offset = sum / f->n;
 }
 
-void facet_heights(const struct facet *f, const double normal[3], double offset,
-                   double *lowest, double *highest)
+void geo_facet_heights(const struct facet *f, const double normal[3], double offset,
+                       double *lowest, double *highest)
 {
 	*lowest = INFINITY;
 	*highest = -INFINITY;
@@ -54,7 +54,7 @@ void facet_heights(const struct facet *f, const double normal[3], double offset,
 	}
 }
 
-void edge_divide(const double a[3], double ha, const double b[3], double hb, double out[3])
+void geo_edge_divide(const double a[3], double ha, const double b[3], double hb, double out[3])
 {
 	const double *low = ha < hb ? a : b, *high = ha < hb ? b : a;
 	double w = ha < hb ? ha / (ha - hb) : hb / (hb - ha);
@@ -63,8 +63,8 @@ void edge_divide(const double a[3], double ha, const double b[3], double hb, dou
 		out[k] = low[k] + w * (high[k] - low[k]);
 }
 
-int facet_clip(const struct facet *f, const double normal[3], double offset,
-               struct facet_room *out)
+int geo_facet_clip(const struct facet *f, const double normal[3], double offset,
+                   struct facet_room *out)
 {
 	double corner[FACET_CORNERS * 3], h[FACET_CORNERS];
 	int n = 0;
@@ -76,7 +76,7 @@ int facet_clip(const struct facet *f, const double normal[3], double offset,
 		if (h[i] >= 0 && n < FACET_CORNERS)
 			memcpy(&corner[3 * n++], &f->v[3 * i], 3 * sizeof *corner);
 		if (((h[i] > 0 && h[j] < 0) || (h[i] < 0 && h[j] > 0)) && n < FACET_CORNERS)
-			edge_divide(&f->v[3 * i], h[i], &f->v[3 * j], h[j], &corner[3 * n++]);
+			geo_edge_divide(&f->v[3 * i], h[i], &f->v[3 * j], h[j], &corner[3 * n++]);
 	}
 	if (n < 3)
 		return 0;
@@ -91,17 +91,17 @@ int facet_clip(const struct facet *f, const double normal[3], double offset,
 	return g.area > 0;
 }
 
-int facet_split(const struct facet *f, const double normal[3], double offset,
-                struct facet_room part[2])
+int geo_facet_split(const struct facet *f, const double normal[3], double offset,
+                    struct facet_room part[2])
 {
 	double back[3] = { -normal[0], -normal[1], -normal[2] };
 
-	return f->n < FACET_CORNERS && facet_clip(f, normal, offset, &part[0]) &&
-	       facet_clip(f, back, -offset, &part[1]);
+	return f->n < FACET_CORNERS && geo_facet_clip(f, normal, offset, &part[0]) &&
+	       geo_facet_clip(f, back, -offset, &part[1]);
 }
 
 /* Unit vector along the longest edge. */
-static void longest_edge(const struct facet *f, double along[3])
+static void mesh_longest_edge(const struct facet *f, double along[3])
 {
 	double longest = 0, u[3];
 
@@ -115,28 +115,28 @@ static void longest_edge(const struct facet *f, double along[3])
 	}
 }
 
-int facet_halve(const struct facet *f, struct facet_room half[2])
+int geo_facet_halve(const struct facet *f, struct facet_room half[2])
 {
 	double along[3] = { 0 };
 
-	longest_edge(f, along);
-	return facet_split(f, along, v3_dot(along, f->centre), half);
+	mesh_longest_edge(f, along);
+	return geo_facet_split(f, along, v3_dot(along, f->centre), half);
 }
 
-int facet_quarter(const struct facet *f, struct facet_room quarter[4])
+int geo_facet_quarter(const struct facet *f, struct facet_room quarter[4])
 {
 	struct facet_room half[2];
 	double along[3] = { 0 }, across[3];
 
-	longest_edge(f, along);
+	mesh_longest_edge(f, along);
 	v3_cross(f->normal, along, across);
 	double middle = v3_dot(across, f->centre);
-	return facet_split(f, along, v3_dot(along, f->centre), half) &&
-	       facet_split(&half[0].f, across, middle, quarter) &&
-	       facet_split(&half[1].f, across, middle, quarter + 2);
+	return geo_facet_split(f, along, v3_dot(along, f->centre), half) &&
+	       geo_facet_split(&half[0].f, across, middle, quarter) &&
+	       geo_facet_split(&half[1].f, across, middle, quarter + 2);
 }
 
-void facet_point(const struct facet *f, double u, double v, double x[3])
+void geo_facet_point(const struct facet *f, double u, double v, double x[3])
 {
 	double sum = 0, area[FACET_CORNERS] = { 0 };
 	int i;

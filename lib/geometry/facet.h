@@ -25,31 +25,31 @@ struct facet_room {
 };
 
 /* Fills all but n and v from the corners; the plane is the mean one (Newell). */
-void facet_measure(struct facet *f);
+void geo_facet_measure(struct facet *f);
 
 /* Signed distances of the corners of f from a plane, the lowest and the highest. */
-void facet_heights(const struct facet *f, const double normal[3], double offset,
-                   double *lowest, double *highest);
+void geo_facet_heights(const struct facet *f, const double normal[3], double offset,
+                       double *lowest, double *highest);
 
 /* The part of f in front of a plane (normal . x >= offset) into `out`; its plane stays
  * f's. 1, or 0 if nothing is left. f may be out->f. */
-int facet_clip(const struct facet *f, const double normal[3], double offset,
-               struct facet_room *out);
+int geo_facet_clip(const struct facet *f, const double normal[3], double offset,
+                   struct facet_room *out);
 
 /* The parts of f in front of and behind a plane. 0 if one has too many corners or no area. */
-int facet_split(const struct facet *f, const double normal[3], double offset,
-                struct facet_room part[2]);
+int geo_facet_split(const struct facet *f, const double normal[3], double offset,
+                    struct facet_room part[2]);
 
 /* Splits f through its centre across its longest edge, into halves, or both across and
  * along it, into quarters. 0 as above. */
-int facet_halve(const struct facet *f, struct facet_room half[2]);
-int facet_quarter(const struct facet *f, struct facet_room quarter[4]);
+int geo_facet_halve(const struct facet *f, struct facet_room half[2]);
+int geo_facet_quarter(const struct facet *f, struct facet_room quarter[4]);
 
 /* A point that divides the edge from a to b where heights ha and hb have opposite
  * signs: at height 0. The same bits whichever way round the edge is given. */
-void edge_divide(const double a[3], double ha, const double b[3], double hb, double out[3]);
+void geo_edge_divide(const double a[3], double ha, const double b[3], double hb, double out[3]);
 
 /* A point of a convex facet, uniform by area, from two numbers in [0,1). */
-void facet_point(const struct facet *f, double u, double v, double x[3]);
+void geo_facet_point(const struct facet *f, double u, double v, double x[3]);
 
 #endif

@@ -20,7 +20,7 @@ static int compare_spokes(const void *pa, const void *pb)
 
 static uint32_t lower_end(const uint32_t *triangle, uint32_t h)
 {
-	uint32_t a = half_from(triangle, h), b = half_to(triangle, h);
+	uint32_t a = geo_half_edge_from(triangle, h), b = geo_half_edge_to(triangle, h);
 	return a < b ? a : b;
 }
 
@@ -33,7 +33,7 @@ static void file_spokes(const uint32_t *triangle, size_t halves, size_t vertices
 	for (size_t v = 0; v < vertices; v++)
 		first[v + 1] += first[v];
 	for (uint32_t h = 0; h < halves; h++) {
-		uint32_t a = half_from(triangle, h), b = half_to(triangle, h);
+		uint32_t a = geo_half_edge_from(triangle, h), b = geo_half_edge_to(triangle, h);
 		uint32_t *at = &first[a < b ? a : b];
 		spoke[(*at)++] = (struct spoke){ a < b ? b : a, h };
 	}
@@ -43,7 +43,7 @@ static void file_spokes(const uint32_t *triangle, size_t halves, size_t vertices
 	first[0] = 0;
 }
 
-static void number_edges(struct edges *g, struct spoke *spoke, const uint32_t *first,
+static void number_edges(struct half_edges *g, struct spoke *spoke, const uint32_t *first,
                          size_t vertices)
 {
 	for (size_t v = 0; v < vertices; v++) {
@@ -58,14 +58,14 @@ static void number_edges(struct edges *g, struct spoke *spoke, const uint32_t *f
 	}
 }
 
-int edges_build(struct edges *g, const uint32_t *triangle, size_t triangles,
-                size_t vertices, struct err *e)
+int geo_half_edges_build(struct half_edges *g, const uint32_t *triangle, size_t triangles,
+                         size_t vertices, struct err *e)
 {
 	int status = -1;
 	uint32_t *first = NULL;
 	struct spoke *spoke = NULL;
 
-	*g = (struct edges){ 0 };
+	*g = (struct half_edges){ 0 };
 	if (triangles > UINT32_MAX / 3)
 		return err_set(e, "%zu triangles are too many: at most %u", triangles,
 		               UINT32_MAX / 3);
@@ -84,19 +84,19 @@ done:
 	free(first);
 	free(spoke);
 	if (status)
-		edges_free(g);
+		geo_half_edges_free(g);
 	return status;
 }
 
-void edges_free(struct edges *g)
+void geo_half_edges_free(struct half_edges *g)
 {
 	free(g->of);
 	free(g->start);
 	free(g->use);
-	*g = (struct edges){ 0 };
+	*g = (struct half_edges){ 0 };
 }
 
-uint32_t *sets_new(size_t n, struct err *e)
+uint32_t *geo_sets_new(size_t n, struct err *e)
 {
 	uint32_t *set = mem_new(n, sizeof *set, "sets", e);
 

@@ -6,14 +6,14 @@
 #include <math.h>
 #include <stdint.h>
 
-struct curve {
+struct morton_curve {
 	double centre[3], scale;  /* of the cube; scale = 1 / side */
 };
 
 /* The curve over the cube about a box. */
-static inline struct curve curve_of(const double lo[3], const double hi[3])
+static inline struct morton_curve geo_morton_curve(const double lo[3], const double hi[3])
 {
-	struct curve c;
+	struct morton_curve c;
 	double side = 0;
 
 	for (int k = 0; k < 3; k++) {
@@ -35,7 +35,7 @@ static inline uint64_t spread_bits(uint64_t x)
 }
 
 /* Code of a point given relative to the box's centre. */
-static inline uint64_t morton(const struct curve *c, const double x[3])
+static inline uint64_t geo_morton(const struct morton_curve *c, const double x[3])
 {
 	uint64_t code = 0;
 

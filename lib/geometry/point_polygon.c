@@ -4,7 +4,7 @@
 
 #define PI 3.14159265358979323846
 
-static void put(struct eye_polygon *p, double x, double y, double z)
+static void put(struct point_polygon *p, double x, double y, double z)
 {
 	p->x[p->n] = x;
 	p->y[p->n] = y;
@@ -12,7 +12,7 @@ static void put(struct eye_polygon *p, double x, double y, double z)
 }
 
 /* Repeats the first corner, or empties what is less than a triangle. */
-static void close_up(struct eye_polygon *p)
+static void close_up(struct point_polygon *p)
 {
 	if (p->n < 3) {
 		p->n = 0;
@@ -23,7 +23,7 @@ static void close_up(struct eye_polygon *p)
 	four_store(p->z + p->n, four_all(p->z[0]));
 }
 
-void eye_polygon_make(struct eye_polygon *p, const double x[3], int n, const double *v)
+void geo_point_polygon_make(struct point_polygon *p, const double x[3], int n, const double *v)
 {
 	p->n = 0;
 	for (int i = 0; i < n; i++)
@@ -34,7 +34,7 @@ void eye_polygon_make(struct eye_polygon *p, const double x[3], int n, const dou
 /* ---- cutting ---- */
 
 /* Where the edge between corners i and j meets the plane; the same bits whichever way round. */
-static void divide(const struct eye_polygon *p, int i, double hi, int j, double hj, double at[3])
+static void divide(const struct point_polygon *p, int i, double hi, int j, double hj, double at[3])
 {
 	int low = hi < hj ? i : j, high = hi < hj ? j : i;
 	double w = hi < hj ? hi / (hi - hj) : hj / (hj - hi);
@@ -44,10 +44,10 @@ static void divide(const struct eye_polygon *p, int i, double hi, int j, double 
 	at[2] = p->z[low] + w * (p->z[high] - p->z[low]);
 }
 
-void eye_polygon_cut(const struct eye_polygon *p, const double normal[3], double zero,
-                     struct eye_polygon *in, struct eye_polygon *away)
+void geo_point_polygon_cut(const struct point_polygon *p, const double normal[3], double zero,
+                           struct point_polygon *in, struct point_polygon *away)
 {
-	double h[EYE_CORNERS + 4], at[3];
+	double h[POINT_POLYGON_CORNERS + 4], at[3];
 
 	for (int i = 0; i < p->n; i += 4)
 		four_store(h + i, normal[0] * four_load(p->x + i) + normal[1] * four_load(p->y + i) +
@@ -100,7 +100,7 @@ static four angle(four y, four x)
 	return four_choose(x < 0, PI - sum, sum);
 }
 
-double eye_polygon_factor(const struct eye_polygon *p, const double normal[3])
+double geo_point_polygon_factor(const struct point_polygon *p, const double normal[3])
 {
 	four sum = { 0 };
 

@@ -6,28 +6,28 @@
 #include "lib/base/vec4.h"
 
 /* Each plane that cuts a convex polygon gives it a corner more, at most. */
-enum { EYE_CORNERS = 80 };
+enum { POINT_POLYGON_CORNERS = 80 };
 
-struct eye_polygon {
+struct point_polygon {
 	int n;
 	/* The first corner stands again behind the last, to the end of that vector and one
 	 * beyond. */
-	double x[EYE_CORNERS + 8], y[EYE_CORNERS + 8], z[EYE_CORNERS + 8];
+	double x[POINT_POLYGON_CORNERS + 8], y[POINT_POLYGON_CORNERS + 8], z[POINT_POLYGON_CORNERS + 8];
 };
 
-/* n (at most EYE_CORNERS) corners v [n][3] as seen from x. */
-void eye_polygon_make(struct eye_polygon *p, const double x[3], int n, const double *v);
+/* n (at most POINT_POLYGON_CORNERS) corners v [n][3] as seen from x. */
+void geo_point_polygon_make(struct point_polygon *p, const double x[3], int n, const double *v);
 
 /* The part of p in front of a plane through the eye into `in`, the rest into `away`; heights
  * up to `zero` are on the plane. Both have room for the corners of p and one more. n is 0
  * where less than a triangle is left. */
-void eye_polygon_cut(const struct eye_polygon *p, const double normal[3], double zero,
-                     struct eye_polygon *in, struct eye_polygon *away);
+void geo_point_polygon_cut(const struct point_polygon *p, const double normal[3], double zero,
+                           struct point_polygon *in, struct point_polygon *away);
 
 /* Fraction of what a Lambertian surface element at the eye with unit normal n emits that
  * reaches the polygon (Lambert 1760; Baum, Rushmeier & Winget, SIGGRAPH 1989): the sum
  * over edges of angle times n . edge plane / 2 pi. All of it is in front of the element;
  * positive where it runs counter-clockwise seen from the eye. */
-double eye_polygon_factor(const struct eye_polygon *p, const double normal[3]);
+double geo_point_polygon_factor(const struct point_polygon *p, const double normal[3]);
 
 #endif

@@ -12,7 +12,7 @@ static void towards(const double *v, const double x[3], double to[3][3])
 	}
 }
 
-double triangle_angle(const double *v, const double x[3])
+double geo_solid_angle(const double *v, const double x[3])
 {
 	double to[3][3], normal[3];
 
@@ -35,8 +35,8 @@ static void along(const double a[3], const double b[3], double c, double out[3])
 
 /* The triangle is cut by an arc from its second corner to the edge between the others, so
  * that one part has the share u[0] of its angle; the direction is on that arc. */
-void triangle_direction(const double *v, const double x[3], double angle,
-                        const double u[2], double dir[3])
+void geo_solid_angle_sample(const double *v, const double x[3], double angle,
+                            const double u[2], double dir[3])
 {
 	double to[3][3], ab[3], ac[3], end[3];
 

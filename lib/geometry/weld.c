@@ -113,7 +113,7 @@ static size_t protect_triangles(struct grid *g)
 	return marked;
 }
 
-int weld_points(const struct weld *w, uint32_t *id, size_t *count, struct err *e)
+int geo_weld_points(const struct weld *w, uint32_t *id, size_t *count, struct err *e)
 {
 	int status = -1;
 	struct grid g = { .w = w, .buckets = 16 };
@@ -141,7 +141,7 @@ done:
 	return status;
 }
 
-double weld_tolerance(const double lo[3], const double hi[3])
+double geo_weld_tolerance(const double lo[3], const double hi[3])
 {
 	double diagonal = 0, largest = 0;
 

@@ -23,11 +23,11 @@ struct weld {
 
 /* Numbers the distinct points in order of their first member: id[points] and
  * *count of them. O(points + triangles). */
-int weld_points(const struct weld *w, uint32_t *id, size_t *count, struct err *e);
+int geo_weld_points(const struct weld *w, uint32_t *id, size_t *count, struct err *e);
 
 /* The distance below which points of a box are one: 1e-9 of its diagonal (far
  * below the spacing of float32, far above the rounding of a transform) and no
  * less than that rounding where the coordinates are large. */
-double weld_tolerance(const double lo[3], const double hi[3]);
+double geo_weld_tolerance(const double lo[3], const double hi[3]);
 
 #endif

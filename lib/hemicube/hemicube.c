@@ -65,7 +65,7 @@ static void scale_to(double *a, size_t n, double total)
 		a[i] = (double)(a[i] * (total / sum));
 }
 
-static void fill_directions(struct hemi_grid *g)
+static void fill_directions(struct hemicube_grid *g)
 {
 	static const double across[5][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, -1, 0 },
 		{ -1, 0, 0 }, { 1, 0, 0 } };
@@ -86,12 +86,12 @@ static void fill_directions(struct hemi_grid *g)
 			}
 }
 
-int hemi_grid_init(struct hemi_grid *g, int n, struct err *e)
+int ff_hemicube_grid_init(struct hemicube_grid *g, int n, struct err *e)
 {
-	*g = (struct hemi_grid){ .n = n };
-	if (n < 2 || n > HEMI_N_MAX || n % 2)
+	*g = (struct hemicube_grid){ .n = n };
+	if (n < 2 || n > HEMICUBE_N_MAX || n % 2)
 		return err_set(e, "hemicube resolution %d: must be even, from 2 to %d", n,
-		               HEMI_N_MAX);
+		               HEMICUBE_N_MAX);
 	size_t top = (size_t)n * (size_t)n, side = top / 2;
 	g->pixels = 3 * top;
 	g->delta = mem_new(g->pixels, sizeof *g->delta, "hemicube pixels", e);
@@ -100,7 +100,7 @@ int hemi_grid_init(struct hemi_grid *g, int n, struct err *e)
 	long double *line = mem_new((size_t)n + 1, sizeof *line, "hemicube pixels", e);
 	if (!g->delta || !g->solid_angle || !g->direction || !line) {
 		free(line);
-		hemi_grid_free(g);
+		ff_hemicube_grid_free(g);
 		return -1;
 	}
 	integrate(corner_top, n, n, -1, line, g->delta);
@@ -116,12 +116,12 @@ int hemi_grid_init(struct hemi_grid *g, int n, struct err *e)
 	return 0;
 }
 
-void hemi_grid_free(struct hemi_grid *g)
+void ff_hemicube_grid_free(struct hemicube_grid *g)
 {
 	free(g->delta);
 	free(g->solid_angle);
 	free(g->direction);
-	*g = (struct hemi_grid){ 0 };
+	*g = (struct hemicube_grid){ 0 };
 }
 
 static size_t pixel_coordinate(double x, int n)
@@ -131,7 +131,7 @@ static size_t pixel_coordinate(double x, int n)
 	return (size_t)(i < 0 ? 0 : i >= n ? n - 1 : i);
 }
 
-size_t hemicube_lookup(const struct hemi_grid *g, const double d[3])
+size_t ff_hemicube_lookup(const struct hemicube_grid *g, const double d[3])
 {
 	double x = fabs(d[0]), y = fabs(d[1]), z = d[2] > 0 ? d[2] : 0;
 	size_t n = (size_t)g->n;
@@ -146,23 +146,23 @@ size_t hemicube_lookup(const struct hemi_grid *g, const double d[3])
 	       pixel_coordinate(u / w + 1, g->n);
 }
 
-int hemicube_init(struct hemicube *h, const struct hemi_grid *g, struct err *e)
+int ff_hemicube_init(struct hemicube *h, const struct hemicube_grid *g, struct err *e)
 {
 	*h = (struct hemicube){ .grid = g };
-	h->item = mem_new(g->pixels + HEMI_LANES, sizeof *h->item, "item buffer", e);
-	h->depth = mem_new(g->pixels + HEMI_LANES, sizeof *h->depth, "depth buffer", e);
+	h->item = mem_new(g->pixels + HEMICUBE_LANES, sizeof *h->item, "item buffer", e);
+	h->depth = mem_new(g->pixels + HEMICUBE_LANES, sizeof *h->depth, "depth buffer", e);
 	h->work = mem_new(1, sizeof *h->work, "hemicube", e);
 	if (h->work)
-		h->work->far = mem_new(hemi_tiles(g->n) * (hemi_tiles(g->n) + 4 * hemi_tiles(g->n / 2)),
+		h->work->far = mem_new(ff_hemicube_tiles(g->n) * (ff_hemicube_tiles(g->n) + 4 * ff_hemicube_tiles(g->n / 2)),
 		                       sizeof *h->work->far, "depth tiles", e);
 	if (!h->item || !h->depth || !h->work || !h->work->far) {
-		hemicube_free(h);
+		ff_hemicube_free(h);
 		return -1;
 	}
 	return 0;
 }
 
-void hemicube_free(struct hemicube *h)
+void ff_hemicube_free(struct hemicube *h)
 {
 	free(h->item);
 	free(h->depth);
@@ -172,7 +172,7 @@ void hemicube_free(struct hemicube *h)
 	*h = (struct hemicube){ 0 };
 }
 
-double hemicube_gather(const struct hemicube *h, double *f)
+double ff_hemicube_sum(const struct hemicube *h, double *f)
 {
 	const double *delta = h->grid->delta;
 	size_t pixels = h->grid->pixels;
@@ -184,7 +184,7 @@ double hemicube_gather(const struct hemicube *h, double *f)
 		do
 			sum += delta[i++];
 		while (i < pixels && h->item[i] == item);
-		if (item == HEMI_VOID)
+		if (item == HEMICUBE_VOID)
 			unseen += sum;
 		else
 			f[item] += sum;
@@ -192,7 +192,7 @@ double hemicube_gather(const struct hemicube *h, double *f)
 	return unseen;
 }
 
-double hemicube_distance(const struct hemicube *h, size_t i)
+double ff_hemicube_distance(const struct hemicube *h, size_t i)
 {
 	const double *d = &h->grid->direction[3 * i];
 

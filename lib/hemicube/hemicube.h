@@ -6,7 +6,7 @@
  * Face 0 has n rows of n pixels, the others n/2 rows, the lowest on the horizon;
  * pixels are numbered face by face, row by row, 3 n^2 in all.
  *
- * hemi_grid and hemi_scene are read-only and shared by all threads; a struct
+ * hemicube_grid and hemicube_scene are read-only and shared by all threads; a struct
  * hemicube belongs to one thread. */
 #ifndef TWOPASS_HEMICUBE_H
 #define TWOPASS_HEMICUBE_H
@@ -17,11 +17,11 @@
 #include "lib/base/err.h"
 #include "lib/data/model.h"
 
-#define HEMI_VOID 0xffffffffu  /* a pixel that sees nothing; no element */
-enum { HEMI_N_MAX = 8192 };
+#define HEMICUBE_VOID 0xffffffffu  /* a pixel that sees nothing; no element */
+enum { HEMICUBE_N_MAX = 8192 };
 
 /* What depends on the resolution alone. */
-struct hemi_grid {
+struct hemicube_grid {
 	int n;                /* resolution of the top face, even */
 	size_t pixels;        /* 3 n^2 */
 	double *delta;        /* [pixels] form factor of a pixel, the exact integral of
@@ -30,36 +30,36 @@ struct hemi_grid {
 	double *direction;    /* [pixels][3] unit, through the pixel's centre */
 };
 
-/* Tables for an even resolution 2 <= n <= HEMI_N_MAX. 0, or -1 and e. O(n^2). */
-int hemi_grid_init(struct hemi_grid *g, int n, struct err *e);
-void hemi_grid_free(struct hemi_grid *g);
+/* Tables for an even resolution 2 <= n <= HEMICUBE_N_MAX. 0, or -1 and e. O(n^2). */
+int ff_hemicube_grid_init(struct hemicube_grid *g, int n, struct err *e);
+void ff_hemicube_grid_free(struct hemicube_grid *g);
 
 /* The pixel that a direction of the upper hemisphere (any length but 0, cube's
  * frame) falls into. Directions below the horizon give its lowest row. O(1). */
-size_t hemicube_lookup(const struct hemi_grid *g, const double direction[3]);
+size_t ff_hemicube_lookup(const struct hemicube_grid *g, const double direction[3]);
 
 /* All elements of a model, arranged for drawing. */
-struct hemi_scene;
+struct hemicube_scene;
 
 /* O(elements log elements). m must outlive it. NULL and e on failure. */
-struct hemi_scene *hemi_scene_new(const struct model *m, struct err *e);
-void hemi_scene_free(struct hemi_scene *s);
+struct hemicube_scene *ff_hemicube_scene_new(const struct model *m, struct err *e);
+void ff_hemicube_scene_free(struct hemicube_scene *s);
 
-struct hemi_work;
+struct hemicube_work;
 
 struct hemicube {
-	const struct hemi_grid *grid;
-	uint32_t *item;          /* [pixels] element-side seen, or HEMI_VOID */
+	const struct hemicube_grid *grid;
+	uint32_t *item;          /* [pixels] element-side seen, or HEMICUBE_VOID */
 	float *depth;            /* [pixels] 1 / distance along the face's axis, 0 where
 	                            nothing is seen */
-	struct hemi_work *work;
+	struct hemicube_work *work;
 };
 
 /* Buffers for one thread; g must outlive them. 0, or -1 and e. */
-int hemicube_init(struct hemicube *h, const struct hemi_grid *g, struct err *e);
-void hemicube_free(struct hemicube *h);
+int ff_hemicube_init(struct hemicube *h, const struct hemicube_grid *g, struct err *e);
+void ff_hemicube_free(struct hemicube *h);
 
-/* Draws all elements but `own` (HEMI_VOID: all) as seen from eye into item and
+/* Draws all elements but `own` (HEMICUBE_VOID: all) as seen from eye into item and
  * depth. frame = { t, b, n }, orthonormal. Elements are seen from both sides;
  * the side recorded is the one that faces the eye. A pixel shows what its centre
  * sees; of equal depths the lowest number wins. Nothing in the horizon plane is
@@ -69,14 +69,14 @@ void hemicube_free(struct hemicube *h);
  * worth, the triangles are drawn (without own's) and each pixel's element is found
  * in them. O(elements + pixels), or O(triangles + pixels log elements); what is
  * below the horizon or behind nearer things is passed over. No allocation. */
-void hemicube_render(struct hemicube *h, const struct hemi_scene *s, const double eye[3],
-                     const double frame[3][3], uint32_t own);
+void ff_hemicube_render(struct hemicube *h, const struct hemicube_scene *s, const double eye[3],
+                        const double frame[3][3], uint32_t own);
 
 /* Adds the delta form factors of all pixels to f[item], f[2 elements], and
  * returns the sum of those that see nothing. */
-double hemicube_gather(const struct hemicube *h, double *f);
+double ff_hemicube_sum(const struct hemicube *h, double *f);
 
 /* Distance from the eye to what pixel i sees along its direction. */
-double hemicube_distance(const struct hemicube *h, size_t i);
+double ff_hemicube_distance(const struct hemicube *h, size_t i);
 
 #endif

@@ -28,7 +28,7 @@ struct depth_plane {
 
 /* Draws columns [left, right) of a row. A pixel's depth is a function of the plane
  * and the pixel alone, so coincident surfaces get the same. */
-static inline void draw_span(const struct hemi_target *t, int row, int left, int right,
+static inline void draw_span(const struct hemicube_target *t, int row, int left, int right,
                              const struct depth_plane *p, uint32_t item)
 {
 	static const v8i lane = { 0, 1, 2, 3, 4, 5, 6, 7 };
@@ -37,7 +37,7 @@ static inline void draw_span(const struct hemi_target *t, int row, int left, int
 	double q = p->q0 + p->qy * (row + .5);
 	v8u id = item - (v8u){ 0 };
 
-	for (int i = left; i < right; i += HEMI_LANES) {
+	for (int i = left; i < right; i += HEMICUBE_LANES) {
 		v4f a = __builtin_convertvector(q + p->qx * (low + i), v4f);
 		v4f b = __builtin_convertvector(q + p->qx * (high + i), v4f);
 		v8f z, near = __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
@@ -58,7 +58,7 @@ struct edge {
 	double x, y, slope, low, high;
 };
 
-static inline struct edge edge_between(const struct hemi_corner *a, const struct hemi_corner *b)
+static inline struct edge edge_between(const struct hemicube_corner *a, const struct hemicube_corner *b)
 {
 	return (struct edge){ a->x - .5, a->y - .5, (b->x - a->x) / (b->y - a->y),
 	                      min_d(a->x, b->x) - .5, max_d(a->x, b->x) - .5 };
@@ -72,7 +72,7 @@ static inline int edge_column(const struct edge *e, int row)
 	return (int)ceil(max_d(min_d(x, e->high), e->low));
 }
 
-static inline void draw_rows(const struct hemi_target *t, int begin, int end,
+static inline void draw_rows(const struct hemicube_target *t, int begin, int end,
                              const struct edge *e, const struct edge *f,
                              const struct depth_plane *p, uint32_t item)
 {
@@ -85,11 +85,11 @@ static inline void draw_rows(const struct hemi_target *t, int begin, int end,
 }
 
 /* Sorts by row and draws above and below the middle corner. */
-static void draw_triangle(const struct hemi_target *t, const struct hemi_corner *a,
-                          const struct hemi_corner *b, const struct hemi_corner *c,
+static void draw_triangle(const struct hemicube_target *t, const struct hemicube_corner *a,
+                          const struct hemicube_corner *b, const struct hemicube_corner *c,
                           const struct depth_plane *p, uint32_t item)
 {
-	const struct hemi_corner *swap;
+	const struct hemicube_corner *swap;
 
 	if (b->row < a->row)
 		swap = a, a = b, b = swap;
@@ -116,7 +116,7 @@ static void draw_triangle(const struct hemi_target *t, const struct hemi_corner 
 /* The depth plane of the triangle abc (face coordinates), whose 1/w lies in
  * [low, high], and the side of it that faces the eye. With normal N and D = N.a,
  * 1/w = N.(u/w, v/w, 1) / D. */
-static inline int depth_plane(const struct hemi_target *t, const double a[3], const double b[3],
+static inline int depth_plane(const struct hemicube_target *t, const double a[3], const double b[3],
                               const double c[3], double low, double high,
                               struct depth_plane *p)
 {
@@ -147,7 +147,7 @@ static double inside_plane(int k, const double p[3])
 {
 	double x = p[k / 2];
 
-	return k % 2 ? HEMI_GUARD * p[2] + x : HEMI_GUARD * p[2] - x;
+	return k % 2 ? HEMICUBE_GUARD * p[2] + x : HEMICUBE_GUARD * p[2] - x;
 }
 
 /* Clips the polygon a of n corners by the pyramid's planes (Sutherland and
@@ -176,9 +176,9 @@ static int clip(double (*a)[3], int n)
 	return n;
 }
 
-static void corner_project(const struct hemi_target *t, const double p[3], struct hemi_corner *c)
+static void corner_project(const struct hemicube_target *t, const double p[3], struct hemicube_corner *c)
 {
-	double limit = (HEMI_GUARD + 1) * t->half;
+	double limit = (HEMICUBE_GUARD + 1) * t->half;
 
 	c->q = 1 / p[2];
 	c->x = (p[0] * c->q + 1) * t->half;
@@ -189,10 +189,10 @@ static void corner_project(const struct hemi_target *t, const double p[3], struc
 	c->row = ceil_centre(c->y);
 }
 
-void hemi_draw_clipped(const struct hemi_target *t, double v[3][3], uint32_t element)
+void ff_hemicube_draw_clipped(const struct hemicube_target *t, double v[3][3], uint32_t element)
 {
 	double polygon[8][3];
-	struct hemi_corner c[8];
+	struct hemicube_corner c[8];
 	struct depth_plane p;
 	double low = INFINITY, high = 0;
 
@@ -212,8 +212,8 @@ void hemi_draw_clipped(const struct hemi_target *t, double v[3][3], uint32_t ele
 		draw_triangle(t, &c[0], &c[i - 1], &c[i], &p, 2 * element + side);
 }
 
-void hemi_draw(const struct hemi_target *t, double v[3][3], const struct hemi_corner c[3],
-               uint32_t element)
+void ff_hemicube_draw(const struct hemicube_target *t, double v[3][3], const struct hemicube_corner c[3],
+                      uint32_t element)
 {
 	struct depth_plane p;
 	uint32_t side = (uint32_t)depth_plane(t, v[0], v[1], v[2],

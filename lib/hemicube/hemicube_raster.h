@@ -6,10 +6,10 @@
 
 /* Triangles are clipped by a pyramid this many times as wide as the face: wide
  * enough that few need it. */
-#define HEMI_GUARD 4.
+#define HEMICUBE_GUARD 4.
 
 /* A face of one hemicube being drawn. */
-struct hemi_target {
+struct hemicube_target {
 	uint32_t *item;
 	float *depth;
 	int columns, rows;
@@ -21,18 +21,18 @@ struct hemi_target {
 
 /* A vertex on a face: pixel coordinates, 1/w, and the first column and row whose
  * pixel centres are not before it. */
-struct hemi_corner {
+struct hemicube_corner {
 	double x, y, q;
 	int32_t column, row;
 };
 
 /* Draws a triangle, corners v in face coordinates (u, v, w), of which c are the
  * projections; the pyramid must hold it. */
-void hemi_draw(const struct hemi_target *t, double v[3][3], const struct hemi_corner c[3],
-               uint32_t element);
+void ff_hemicube_draw(const struct hemicube_target *t, double v[3][3], const struct hemicube_corner c[3],
+                      uint32_t element);
 
 /* Draws any triangle. */
-void hemi_draw_clipped(const struct hemi_target *t, double v[3][3], uint32_t element);
+void ff_hemicube_draw_clipped(const struct hemicube_target *t, double v[3][3], uint32_t element);
 
 static inline double min_d(double a, double b)
 {

@@ -26,8 +26,8 @@ static const struct face {
 	{ 0, 2, 1, -1, 1 }, { 0, 2, 1, 1, -1 } };
 
 /* Cluster vertices into the cube's frame. */
-static void transform(const struct hemi_mesh *s, const struct hemi_cluster *c,
-                      const double eye[3], const double frame[3][3], struct hemi_work *w)
+static void transform(const struct hemicube_mesh *s, const struct hemicube_cluster *c,
+                      const double eye[3], const double frame[3][3], struct hemicube_work *w)
 {
 	for (int i = 0; i < c->vertices; i += 4) {
 		v4d x, y, z;
@@ -55,7 +55,7 @@ static inline void store_ceil_centre(int32_t *out, const v4d *x)
 
 /* Projects a cluster's vertices. If `coded`, also says on which sides of the
  * pyramid and of the horizon they are; those outside are not projected. */
-static void project(const struct hemi_target *t, const struct face *f, struct hemi_work *w,
+static void project(const struct hemicube_target *t, const struct face *f, struct hemicube_work *w,
                     int vertices, int coded, double horizon)
 {
 	for (int i = 0; i < vertices; i += 4) {
@@ -65,8 +65,8 @@ static void project(const struct hemi_target *t, const struct face *f, struct he
 		memcpy(&c, &w->v[f->w][i], sizeof c);
 		a *= f->su, c *= f->sw;
 		if (coded) {
-			v4l out = ((a > HEMI_GUARD * c) & OUT_RIGHT) | ((a < -HEMI_GUARD * c) & OUT_LEFT) |
-			          ((b > HEMI_GUARD * c) & OUT_UP) | ((b < -HEMI_GUARD * c) & OUT_DOWN);
+			v4l out = ((a > HEMICUBE_GUARD * c) & OUT_RIGHT) | ((a < -HEMICUBE_GUARD * c) & OUT_LEFT) |
+			          ((b > HEMICUBE_GUARD * c) & OUT_UP) | ((b < -HEMICUBE_GUARD * c) & OUT_DOWN);
 			v4d height;
 			memcpy(&height, &w->v[2][i], sizeof height);
 			v4i code = __builtin_convertvector(
@@ -85,7 +85,7 @@ static void project(const struct hemi_target *t, const struct face *f, struct he
 	}
 }
 
-static inline void face_vertex(const struct hemi_work *w, const struct face *f, int i,
+static inline void face_vertex(const struct hemicube_work *w, const struct face *f, int i,
                                double out[3])
 {
 	out[0] = f->su * w->v[f->u][i];
@@ -94,28 +94,28 @@ static inline void face_vertex(const struct hemi_work *w, const struct face *f, 
 }
 
 /* Draws the triangle with corners i of the cluster. */
-static void draw_element(const struct hemi_target *t, const struct face *f,
-                         const struct hemi_work *w, const int i[3], uint32_t element,
+static void draw_element(const struct hemicube_target *t, const struct face *f,
+                         const struct hemicube_work *w, const int i[3], uint32_t element,
                          int clipped)
 {
-	struct hemi_corner c[3];
+	struct hemicube_corner c[3];
 	double v[3][3];
 
 	for (int k = 0; k < 3; k++)
 		face_vertex(w, f, i[k], v[k]);
 	if (clipped) {
-		hemi_draw_clipped(t, v, element);
+		ff_hemicube_draw_clipped(t, v, element);
 		return;
 	}
 	for (int k = 0; k < 3; k++)
-		c[k] = (struct hemi_corner){ w->px[i[k]], w->py[i[k]], w->pq[i[k]],
+		c[k] = (struct hemicube_corner){ w->px[i[k]], w->py[i[k]], w->pq[i[k]],
 			                     w->column[i[k]], w->row[i[k]] };
-	hemi_draw(t, v, c, element);
+	ff_hemicube_draw(t, v, c, element);
 }
 
-static void draw_cluster(const struct hemi_target *t, const struct face *f,
-                         const struct hemi_mesh *s, const struct hemi_cluster *c,
-                         const struct hemi_work *w, int coded, uint32_t own)
+static void draw_cluster(const struct hemicube_target *t, const struct face *f,
+                         const struct hemicube_mesh *s, const struct hemicube_cluster *c,
+                         const struct hemicube_work *w, int coded, uint32_t own)
 {
 	for (size_t n = c->triangle; n < c->triangle + (size_t)c->triangles; n++) {
 		const uint8_t *v = s->corner[n];
@@ -152,22 +152,22 @@ static int sphere_inside(const struct face *f, const double c[3], double radius,
 }
 
 /* Notes the least depth of each tile of a face. */
-static void note_far(const struct hemi_target *t)
+static void note_far(const struct hemicube_target *t)
 {
 	float *out = t->far;
 
-	for (int j = 0; j < t->rows; j += HEMI_LANES)
-		for (int i = 0; i < t->columns; i += HEMI_LANES, out++) {
+	for (int j = 0; j < t->rows; j += HEMICUBE_LANES)
+		for (int i = 0; i < t->columns; i += HEMICUBE_LANES, out++) {
 			v8f least = (v8f){ 0 } + INFINITY;
 			/* Beyond the end of a row are other pixels: that is only cautious. */
-			for (int row = j; row < min_i(j + HEMI_LANES, t->rows); row++) {
+			for (int row = j; row < min_i(j + HEMICUBE_LANES, t->rows); row++) {
 				v8f z;
 				memcpy(&z, t->depth + (size_t)row * (size_t)t->columns + i, sizeof z);
 				v8i less = z < least;
 				least = (v8f)(((v8i)z & less) | ((v8i)least & ~less));
 			}
 			*out = least[0];
-			for (int k = 1; k < HEMI_LANES; k++)
+			for (int k = 1; k < HEMICUBE_LANES; k++)
 				*out = least[k] < *out ? least[k] : *out;
 		}
 }
@@ -179,15 +179,15 @@ static inline void tile_range(double x, double w, double r, double half, double 
 	double low = (x - r) / (x > r ? w + r : w - r);
 	double high = (x + r) / (x > -r ? w - r : w + r);
 
-	low = max_d((low * half + centre) / HEMI_LANES - 1e-6, 0);
-	high = min_d((high * half + centre) / HEMI_LANES + 1e-6, tiles - 1);
+	low = max_d((low * half + centre) / HEMICUBE_LANES - 1e-6, 0);
+	high = min_d((high * half + centre) / HEMICUBE_LANES + 1e-6, tiles - 1);
 	range[0] = (int)low;
 	range[1] = (int)high;
 }
 
 /* 1 if a sphere (centre in the cube's frame) was wholly behind what had been drawn
  * on the face when its tiles were noted. */
-static int hidden(const struct hemi_target *t, const struct face *f, const double c[3], double r)
+static int hidden(const struct hemicube_target *t, const struct face *f, const double c[3], double r)
 {
 	double w = f->sw * c[f->w];
 	int column[2], row[2];
@@ -196,7 +196,7 @@ static int hidden(const struct hemi_target *t, const struct face *f, const doubl
 		return 0;
 	double nearest = 1.000001 / (w - r);
 	tile_range(f->su * c[f->u], w, r, t->half, t->half, t->tiles, column);
-	tile_range(c[f->v], w, r, t->half, t->centre_row, (t->rows + HEMI_LANES - 1) / HEMI_LANES,
+	tile_range(c[f->v], w, r, t->half, t->centre_row, (t->rows + HEMICUBE_LANES - 1) / HEMICUBE_LANES,
 	           row);
 	for (int j = row[0]; j <= row[1]; j++)
 		for (int i = column[0]; i <= column[1]; i++)
@@ -205,32 +205,32 @@ static int hidden(const struct hemi_target *t, const struct face *f, const doubl
 	return 1;
 }
 
-static struct hemi_target target_face(const struct hemicube *h, int face)
+static struct hemicube_target target_face(const struct hemicube *h, int face)
 {
-	size_t n = (size_t)h->grid->n, tiles = hemi_tiles(h->grid->n);
+	size_t n = (size_t)h->grid->n, tiles = ff_hemicube_tiles(h->grid->n);
 	size_t before = face ? (size_t)(face - 1) : 0;
 	size_t first = face ? n * n + before * (n * n / 2) : 0;
-	size_t tile = face ? tiles * (tiles + before * hemi_tiles(h->grid->n / 2)) : 0;
+	size_t tile = face ? tiles * (tiles + before * ff_hemicube_tiles(h->grid->n / 2)) : 0;
 	int half = h->grid->n / 2;
 
-	return (struct hemi_target){ .item = h->item + first, .depth = h->depth + first,
+	return (struct hemicube_target){ .item = h->item + first, .depth = h->depth + first,
 	                        .columns = h->grid->n, .rows = face ? half : 2 * half,
 	                        .half = half, .pixel = 1. / half,
 	                        .centre_row = face ? 0 : half,
 	                        .far = h->work->far + tile, .tiles = (int)tiles };
 }
 
-/* What one call of hemicube_render draws. */
+/* What one call of ff_hemicube_render draws. */
 struct drawing {
-	const struct hemi_mesh *s;
+	const struct hemicube_mesh *s;
 	const double *eye;
 	const double (*frame)[3];
 	uint32_t own;
-	struct hemi_target target[5];
+	struct hemicube_target target[5];
 };
 
-static void render_cluster(const struct drawing *g, struct hemi_work *w,
-                           const struct hemi_cluster *c)
+static void render_cluster(const struct drawing *g, struct hemicube_work *w,
+                           const struct hemicube_cluster *c)
 {
 	double d[3], at[3];
 	int transformed = 0;
@@ -249,19 +249,19 @@ static void render_cluster(const struct drawing *g, struct hemi_work *w,
 			transform(g->s, c, g->eye, g->frame, w);
 		transformed = 1;
 		int coded = at[2] - c->radius <= g->s->horizon ||
-		            !sphere_inside(f, at, c->radius, HEMI_GUARD, 1);
+		            !sphere_inside(f, at, c->radius, HEMICUBE_GUARD, 1);
 		project(&g->target[k], f, w, c->vertices, coded, g->s->horizon);
 		draw_cluster(&g->target[k], f, g->s, c, w, coded, g->own);
 		w->drawn += (size_t)c->triangles;
 	}
 }
 
-static void draw_mesh(struct hemicube *h, const struct hemi_mesh *s, const double eye[3],
+static void draw_mesh(struct hemicube *h, const struct hemicube_mesh *s, const double eye[3],
                       const double frame[3][3], uint32_t own)
 {
 	struct drawing g = { .s = s, .eye = eye, .frame = frame, .own = own };
-	size_t tiles = hemi_tiles(h->grid->n) * (hemi_tiles(h->grid->n) +
-	                                         4 * hemi_tiles(h->grid->n / 2));
+	size_t tiles = ff_hemicube_tiles(h->grid->n) * (ff_hemicube_tiles(h->grid->n) +
+	                                                4 * ff_hemicube_tiles(h->grid->n / 2));
 	int32_t stack[64];
 	int depth = 0;
 
@@ -276,7 +276,7 @@ static void draw_mesh(struct hemicube *h, const struct hemi_mesh *s, const doubl
 	while (depth > 0) {
 		int32_t at = stack[--depth];
 		if (at >= 0) { /* the child on the eye's side first */
-			const struct hemi_split *p = &s->split[at];
+			const struct hemicube_split *p = &s->split[at];
 			int near = eye[p->axis] >= p->at;
 			stack[depth++] = p->child[!near];
 			stack[depth++] = p->child[near];
@@ -297,18 +297,18 @@ static void draw_mesh(struct hemicube *h, const struct hemi_mesh *s, const doubl
 static void find_elements(struct hemicube *h, const struct model *m, const double eye[3],
                           const double frame[3][3])
 {
-	uint32_t known = HEMI_VOID;
+	uint32_t known = HEMICUBE_VOID;
 	double side[3][3]; /* the three products of triangle `known`, cube's frame */
 
 	for (size_t i = 0; i < h->grid->pixels; i++) {
 		uint32_t item = h->item[i];
-		if (item == HEMI_VOID)
+		if (item == HEMICUBE_VOID)
 			continue;
 		if (item >> 1 != known) {
 			known = item >> 1;
 			double v[3][3], d[3];
 			for (int k = 0; k < 3; k++) {
-				v3_sub(&m->vertex[3 * (size_t)m->triangle[3 * (size_t)known + (size_t)k]],
+				v3_sub(&m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)known + (size_t)k]],
 				       eye, d);
 				for (int c = 0; c < 3; c++)
 					v[k][c] = v3_dot(frame[c], d);
@@ -325,16 +325,16 @@ static void find_elements(struct hemicube *h, const struct model *m, const doubl
 	}
 }
 
-void hemicube_render(struct hemicube *h, const struct hemi_scene *s, const double eye[3],
-                     const double frame[3][3], uint32_t own)
+void ff_hemicube_render(struct hemicube *h, const struct hemicube_scene *s, const double eye[3],
+                        const double frame[3][3], uint32_t own)
 {
-	const struct hemi_mesh *t = &s->triangles;
+	const struct hemicube_mesh *t = &s->triangles;
 
 	/* To find a pixel's element takes about as long as to draw two. */
 	if (!t->triangles || s->elements.triangles - t->triangles <= 2 * h->grid->pixels) {
 		draw_mesh(h, &s->elements, eye, frame, own);
 		return;
 	}
-	draw_mesh(h, t, eye, frame, own == HEMI_VOID ? own : s->m->element_triangle[own]);
+	draw_mesh(h, t, eye, frame, own == HEMICUBE_VOID ? own : s->m->element.triangle[own]);
 	find_elements(h, s->m, eye, frame);
 }

@@ -11,7 +11,7 @@
 /* What is needed while clusters are formed. */
 struct builder {
 	const struct model *m;
-	struct hemi_mesh *s;
+	struct hemicube_mesh *s;
 	const uint32_t *corner; /* [triangles][3] the model's vertices */
 	double *centroid;      /* [triangles][3] */
 	uint32_t *order;       /* triangles, permuted */
@@ -20,7 +20,7 @@ struct builder {
 	size_t vertices;       /* emitted so far */
 };
 
-static void exchange(uint32_t *a, uint32_t *b)
+static void occ_exchange(uint32_t *a, uint32_t *b)
 {
 	uint32_t t = *a;
 
@@ -53,7 +53,7 @@ static void select_nth(struct builder *b, int axis, size_t begin, size_t end, si
 				j--;
 			if (i >= j)
 				break;
-			exchange(&o[i], &o[j]);
+			occ_exchange(&o[i], &o[j]);
 		}
 		/* [begin, i) < pivot <= [i, end), and i == j means o[i] is the pivot. */
 		if (k < i)
@@ -81,9 +81,9 @@ static void bounds(const struct builder *b, size_t begin, size_t end, double lo[
 }
 
 /* Number of a model's vertex within cluster c, adding it if it is new. */
-static uint32_t local_vertex(struct builder *b, struct hemi_cluster *c, uint32_t v)
+static uint32_t local_vertex(struct builder *b, struct hemicube_cluster *c, uint32_t v)
 {
-	struct hemi_mesh *s = b->s;
+	struct hemicube_mesh *s = b->s;
 	uint32_t mark = (uint32_t)(s->clusters + 1);
 
 	if (b->stamp[v] == mark)
@@ -96,7 +96,7 @@ static uint32_t local_vertex(struct builder *b, struct hemi_cluster *c, uint32_t
 	return b->local[v] = (uint32_t)c->vertices++;
 }
 
-static void bounding_sphere(const struct hemi_mesh *s, struct hemi_cluster *c)
+static void bounding_sphere(const struct hemicube_mesh *s, struct hemicube_cluster *c)
 {
 	const double *x[3] = { s->x + c->vertex, s->y + c->vertex, s->z + c->vertex };
 	double far = 0;
@@ -120,10 +120,10 @@ static void bounding_sphere(const struct hemi_mesh *s, struct hemi_cluster *c)
 
 static int32_t emit_cluster(struct builder *b, size_t begin, size_t end)
 {
-	struct hemi_mesh *s = b->s;
-	struct hemi_cluster *c = &s->cluster[s->clusters];
+	struct hemicube_mesh *s = b->s;
+	struct hemicube_cluster *c = &s->cluster[s->clusters];
 
-	*c = (struct hemi_cluster){ .vertex = b->vertices, .triangle = begin };
+	*c = (struct hemicube_cluster){ .vertex = b->vertices, .triangle = begin };
 	for (size_t i = begin; i < end; i++) {
 		const uint32_t *v = &b->corner[3 * (size_t)b->order[i]];
 		for (int k = 0; k < 3; k++)
@@ -155,7 +155,7 @@ static int32_t divide(struct builder *b, size_t begin, size_t end)
 	size_t middle = begin + (end - begin) / 2;
 	select_nth(b, axis, begin, end, middle);
 	int32_t n = (int32_t)b->s->splits++;
-	struct hemi_split *p = &b->s->split[n];
+	struct hemicube_split *p = &b->s->split[n];
 	p->axis = axis;
 	p->at = b->centroid[3 * (size_t)b->order[middle] + (size_t)axis];
 	p->child[0] = divide(b, begin, middle);
@@ -184,12 +184,12 @@ static void prepare(struct builder *b)
 static int allocate(struct builder *b, struct err *e)
 {
 	const struct model *m = b->m;
-	struct hemi_mesh *s = b->s;
+	struct hemicube_mesh *s = b->s;
 	size_t n = s->triangles;
 	/* Halving leaves more than CLUSTER_TRIANGLES / 2 in each. */
 	size_t clusters = n / (CLUSTER_TRIANGLES / 2) + 1;
 
-	if (n > HEMI_VOID / 2)
+	if (n > HEMICUBE_VOID / 2)
 		return err_set(e, "too many elements for a hemicube: %zu", n);
 	size_t vertices = 3 * (n + clusters);
 	s->cluster = mem_new(clusters, sizeof *s->cluster, "hemicube clusters", e);
@@ -216,13 +216,13 @@ static void shrink(double **a, size_t n)
 		*a = p;
 }
 
-int hemi_mesh_init(struct hemi_mesh *s, const struct model *m, const uint32_t *corner, size_t n,
-                   struct err *e)
+int ff_hemicube_mesh_init(struct hemicube_mesh *s, const struct model *m, const uint32_t *corner, size_t n,
+                          struct err *e)
 {
 	struct builder b = { .m = m, .s = s, .corner = corner };
 	int bad;
 
-	*s = (struct hemi_mesh){ .triangles = n };
+	*s = (struct hemicube_mesh){ .triangles = n };
 	bad = allocate(&b, e);
 	if (!bad) {
 		prepare(&b);
@@ -239,7 +239,7 @@ int hemi_mesh_init(struct hemi_mesh *s, const struct model *m, const uint32_t *c
 	return bad;
 }
 
-void hemi_mesh_free(struct hemi_mesh *s)
+void ff_hemicube_mesh_free(struct hemicube_mesh *s)
 {
 	free(s->cluster);
 	free(s->split);
@@ -248,31 +248,31 @@ void hemi_mesh_free(struct hemi_mesh *s)
 	free(s->z);
 	free(s->corner);
 	free(s->number);
-	*s = (struct hemi_mesh){ 0 };
+	*s = (struct hemicube_mesh){ 0 };
 }
 
-struct hemi_scene *hemi_scene_new(const struct model *m, struct err *e)
+struct hemicube_scene *ff_hemicube_scene_new(const struct model *m, struct err *e)
 {
-	struct hemi_scene *s = mem_new(1, sizeof *s, "hemicube scene", e);
+	struct hemicube_scene *s = mem_new(1, sizeof *s, "hemicube scene", e);
 
 	if (!s)
 		return NULL;
 	s->m = m;
 	/* Hardly subdivided: the elements are as good as the triangles. */
-	size_t n = m->triangles > m->elements / 2 ? 0 : m->triangles;
-	if (hemi_mesh_init(&s->elements, m, m->element, m->elements, e) ||
-	    hemi_mesh_init(&s->triangles, m, m->triangle, n, e)) {
-		hemi_scene_free(s);
+	size_t n = m->triangle.n > m->element.n / 2 ? 0 : m->triangle.n;
+	if (ff_hemicube_mesh_init(&s->elements, m, m->element.corner, m->element.n, e) ||
+	    ff_hemicube_mesh_init(&s->triangles, m, m->triangle.corner, n, e)) {
+		ff_hemicube_scene_free(s);
 		return NULL;
 	}
 	return s;
 }
 
-void hemi_scene_free(struct hemi_scene *s)
+void ff_hemicube_scene_free(struct hemicube_scene *s)
 {
 	if (!s)
 		return;
-	hemi_mesh_free(&s->elements);
-	hemi_mesh_free(&s->triangles);
+	ff_hemicube_mesh_free(&s->elements);
+	ff_hemicube_mesh_free(&s->triangles);
 	free(s);
 }

@@ -12,7 +12,7 @@
 
 enum { CLUSTER_TRIANGLES = 32, CLUSTER_VERTICES = 3 * CLUSTER_TRIANGLES };
 
-struct hemi_cluster {
+struct hemicube_cluster {
 	double centre[3], radius;  /* bounding sphere */
 	size_t vertex;             /* first, a multiple of 4 */
 	size_t triangle;           /* first */
@@ -21,18 +21,18 @@ struct hemi_cluster {
 };
 
 /* A plane between two sets of clusters, by their triangles' centroids. */
-struct hemi_split {
+struct hemicube_split {
 	double at;
 	int axis;
 	int32_t child[2];          /* below and above: a split, or ~cluster */
 };
 
-struct hemi_mesh {
+struct hemicube_mesh {
 	size_t triangles;
 	size_t clusters;
-	struct hemi_cluster *cluster;
+	struct hemicube_cluster *cluster;
 	size_t splits;
-	struct hemi_split *split;
+	struct hemicube_split *split;
 	int32_t root;              /* as child[]; none where clusters is 0 */
 	double *x, *y, *z;         /* vertices, world */
 	uint8_t (*corner)[4];      /* [triangles] vertices within the cluster, and 0 */
@@ -41,35 +41,35 @@ struct hemi_mesh {
 };
 
 /* Triangles corner[n][3] of m's vertices. 0, or -1 and e; free either way. */
-int hemi_mesh_init(struct hemi_mesh *s, const struct model *m, const uint32_t *corner, size_t n,
-                   struct err *e);
-void hemi_mesh_free(struct hemi_mesh *s);
+int ff_hemicube_mesh_init(struct hemicube_mesh *s, const struct model *m, const uint32_t *corner, size_t n,
+                          struct err *e);
+void ff_hemicube_mesh_free(struct hemicube_mesh *s);
 
 /* A model to be drawn by its elements or, where these are many more, by the input
  * triangles, with the elements found pixel by pixel afterwards. */
-struct hemi_scene {
+struct hemicube_scene {
 	const struct model *m;
-	struct hemi_mesh elements, triangles; /* triangles may be empty */
+	struct hemicube_mesh elements, triangles; /* triangles may be empty */
 };
 
-enum { HEMI_LANES = 8 };
+enum { HEMICUBE_LANES = 8 };
 
 /* A thread's scratch: vertices of one cluster, in the cube's frame and projected
  * onto one face (in pixels). */
-struct hemi_work {
+struct hemicube_work {
 	double v[3][CLUSTER_VERTICES];
 	double px[CLUSTER_VERTICES], py[CLUSTER_VERTICES], pq[CLUSTER_VERTICES];
 	int32_t column[CLUSTER_VERTICES], row[CLUSTER_VERTICES];
 	int32_t code[CLUSTER_VERTICES];
-	float *far;                /* least depth in each tile of HEMI_LANES^2 pixels,
+	float *far;                /* least depth in each tile of HEMICUBE_LANES^2 pixels,
 	                              some time ago */
 	size_t drawn;              /* triangles since */
 };
 
 /* Tiles of the top face, and then of each side. */
-static inline size_t hemi_tiles(int n)
+static inline size_t ff_hemicube_tiles(int n)
 {
-	return (size_t)((n + HEMI_LANES - 1) / HEMI_LANES);
+	return (size_t)((n + HEMICUBE_LANES - 1) / HEMICUBE_LANES);
 }
 
 #endif

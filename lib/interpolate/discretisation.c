@@ -70,7 +70,7 @@ static void centroid(const struct model *m, size_t e, double c[3])
 {
 	memset(c, 0, 3 * sizeof *c);
 	for (size_t k = 0; k < 3; k++)
-		v3_mad(c, 1. / 3, &m->vertex[3 * (size_t)m->element[3 * e + k]], c);
+		v3_mad(c, 1. / 3, &m->vertex[3 * (size_t)m->element.corner[3 * e + k]], c);
 }
 
 static void place(const struct model *m, size_t e, struct near *near, size_t n)
@@ -78,14 +78,14 @@ static void place(const struct model *m, size_t e, struct near *near, size_t n)
 	double at[3], t[3], b[3], sum = 0;
 
 	centroid(m, e, at);
-	v3_frame(&m->element_normal[3 * e], t, b);
+	v3_frame(&m->element.normal[3 * e], t, b);
 	for (size_t i = 0; i < n; i++) {
 		double c[3];
 		centroid(m, near[i].element, c);
 		v3_sub(c, at, c);
 		near[i].x = v3_dot(c, t);
 		near[i].y = v3_dot(c, b);
-		near[i].w = m->element_area[near[i].element];
+		near[i].w = m->element.area[near[i].element];
 		sum += near[i].w;
 	}
 	for (size_t i = 0; i < n; i++)
@@ -136,7 +136,7 @@ static size_t stencil(const struct job *j, size_t e, struct near *near)
 /* Channels of an element that are anything but 0: of one side or of both. */
 static size_t channels_of(const struct job *j, size_t e)
 {
-	int sides = model_side_modelled(j->m, 2 * j->m->element_patch[e] + BACK) ? 2 : 1;
+	int sides = model_side_modelled(j->m, 2 * j->m->element.patch[e] + BACK) ? 2 : 1;
 
 	return (size_t)sides * PARTS * (size_t)j->s->bands;
 }
@@ -198,8 +198,8 @@ static int by_patches(const struct job *j)
 	size_t bytes = 2 * PARTS * (size_t)j->s->bands * sizeof *j->h;
 	int shared = 0;
 
-	for (size_t e = 0; e < j->m->elements; e++) {
-		size_t first = j->m->patch_start[j->m->element_patch[e]];
+	for (size_t e = 0; e < j->m->element.n; e++) {
+		size_t first = j->m->patch.start[j->m->element.patch[e]];
 		if (memcmp((char *)j->h + e * bytes, (char *)j->h + first * bytes, bytes))
 			return 0;
 		shared |= e != first;
@@ -223,8 +223,8 @@ static void correct_noise(struct job *j)
 		j->noise[i] *= scale[i / bands % PARTS];
 	for (size_t i = 0; i < n; i++) {
 		const double *v = &j->variance[i / bands * PARTS * bands + i % bands];
-		j->s->error_direct[i] = sqrt(scale[0] * v[0]);
-		j->s->error[i] = sqrt(fmax(scale[0] * v[0], whole * (v[0] + v[bands])));
+		j->s->error.sampling_direct[i] = sqrt(scale[0] * v[0]);
+		j->s->error.sampling[i] = sqrt(fmax(scale[0] * v[0], whole * (v[0] + v[bands])));
 	}
 }
 
@@ -237,7 +237,7 @@ struct moments {
 
 static void add(const struct job *j, size_t e, size_t at, struct moments *m)
 {
-	double a = j->m->element_area[e], d = j->difference[at];
+	double a = j->m->element.area[e], d = j->difference[at];
 
 	if (isnan(d))
 		return;
@@ -266,8 +266,8 @@ static void errors(void *arg, size_t begin, size_t end, int thread)
 	(void)thread;
 	for (size_t e = begin; e < end; e++) {
 		size_t n = list_near(j, e, 1, near);
-		double *to = &j->s->discretisation[2 * e * bands];
-		double *direct = &j->s->discretisation_direct[2 * e * bands];
+		double *to = &j->s->error.discretisation[2 * e * bands];
+		double *direct = &j->s->error.discretisation_direct[2 * e * bands];
 		size_t some = channels_of(j, e);
 		memset(to, 0, 2 * bands * sizeof *to);
 		for (size_t c = 0; c < some; c++) {
@@ -293,18 +293,18 @@ static void take_parts(const struct job *j)
 
 	for (size_t i = 0; i < s->groups * n; i++) {
 		double *h = &j->h[i % n / bands * PARTS * bands + i % bands];
-		h[0] += s->direct[i];
-		h[bands] += s->caustic[i] + s->indirect[i];
+		h[0] += s->irradiance.direct[i];
+		h[bands] += s->irradiance.caustic[i] + s->irradiance.indirect[i];
 	}
 	for (size_t i = 0; i < n; i++) {
 		double *v = &j->variance[i / bands * PARTS * bands + i % bands];
-		v[0] = s->error_direct[i] * s->error_direct[i];
-		v[bands] = fmax(0, s->error[i] * s->error[i] - v[0]);
+		v[0] = s->error.sampling_direct[i] * s->error.sampling_direct[i];
+		v[bands] = fmax(0, s->error.sampling[i] * s->error.sampling[i] - v[0]);
 	}
 }
 
-int discretisation_estimate(const struct model *m, struct solution *s, int threads,
-                            struct err *e)
+int interp_discretisation(const struct model *m, struct solution *s, int threads,
+                          struct err *e)
 {
 	size_t n = s->element_sides * PARTS * (size_t)s->bands;
 	struct job j = { .m = m, .s = s };
@@ -315,18 +315,18 @@ int discretisation_estimate(const struct model *m, struct solution *s, int threa
 	j.noise = mem_new(n, sizeof *j.noise, "irradiance", e);
 	j.variance = mem_new(n, sizeof *j.variance, "irradiance", e);
 	if (j.h && j.variance && j.difference && j.noise &&
-	    !smooth_groups_new(m, cos_crease, &j.g, e)) {
+	    !interp_smooth_groups_new(m, cos_crease, &j.g, e)) {
 		take_parts(&j);
-		par_for(m->elements, CHUNK, threads, differences, &j, NULL);
+		par_for(m->element.n, CHUNK, threads, differences, &j, NULL);
 		if (!by_patches(&j))
 			correct_noise(&j);
-		par_for(m->elements, CHUNK, threads, errors, &j, NULL);
+		par_for(m->element.n, CHUNK, threads, errors, &j, NULL);
 		bad = 0;
 	}
 	free(j.h);
 	free(j.variance);
 	free(j.difference);
 	free(j.noise);
-	smooth_groups_free(&j.g);
+	interp_smooth_groups_free(&j.g);
 	return bad ? -1 : 0;
 }

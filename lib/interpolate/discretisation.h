@@ -24,7 +24,7 @@
  * element-side. 0 where too few others of the same smooth surface touch it and its
  * neighbours, since nothing is known there. Light groups are summed. O(elements), the same
  * for any number of threads. 0, or -1 and e. */
-int discretisation_estimate(const struct model *m, struct solution *s, int threads,
-                            struct err *e);
+int interp_discretisation(const struct model *m, struct solution *s, int threads,
+                          struct err *e);
 
 #endif

@@ -108,11 +108,11 @@ static void run(struct reconstruct_job *j, int threads)
 {
 	enum { CHUNK = 1024, SPREADS = 3 };
 
-	par_for(j->g.groups, CHUNK, threads, reconstruct_fit, j, NULL);
-	par_for(j->m->elements, CHUNK, threads, find_rest, j, NULL);
+	par_for(j->g.groups, CHUNK, threads, interp_reconstruct_fit, j, NULL);
+	par_for(j->m->element.n, CHUNK, threads, find_rest, j, NULL);
 	for (int i = 0; i < SPREADS; i++) {
 		if (i > 0)
-			par_for(j->m->elements, CHUNK, threads, spread_to_elements, j, NULL);
+			par_for(j->m->element.n, CHUNK, threads, spread_to_elements, j, NULL);
 		par_for(j->g.groups, CHUNK, threads, spread_to_groups, j, NULL);
 	}
 	par_for(j->g.groups, CHUNK, threads, store_groups, j, NULL);
@@ -155,12 +155,12 @@ static void set_precisions(struct reconstruct_job *j, unsigned parts)
 	for (size_t i = 0; i < s->element_sides; i += step) {
 		double *to = channels_of(j, j->precision, i, 0);
 		for (size_t b = 0; b < bands; b++) {
-			double all = s->error[i * bands + b];
-			double direct = s->error_direct ? s->error_direct[i * bands + b] : 0;
+			double all = s->error.sampling[i * bands + b];
+			double direct = s->error.sampling_direct ? s->error.sampling_direct[i * bands + b] : 0;
 			double other = precision_of(all * all - direct * direct);
 			if ((size_t)j->columns > bands)
 				to[bands + b] = other;
-			to[b] = s->error_direct && parts & PART_DIRECT ? precision_of(direct * direct) : other;
+			to[b] = s->error.sampling_direct && parts & PART_DIRECT ? precision_of(direct * direct) : other;
 		}
 	}
 }
@@ -176,24 +176,24 @@ static lanes *new_rows(struct reconstruct_job *j, int number, size_t n, struct e
 static int set_columns(struct reconstruct_job *j, unsigned parts, struct err *e)
 {
 	const struct solution *s = j->s;
-	int apart = parts & PART_DIRECT && parts != PART_DIRECT && s->error && s->error_direct;
+	int apart = parts & PART_DIRECT && parts != PART_DIRECT && s->error.sampling && s->error.sampling_direct;
 
 	j->columns = s->bands * (1 + apart);
 	j->sides = 1;
-	for (uint32_t p = 0; p < j->m->patches; p++)
+	for (uint32_t p = 0; p < j->m->patch.n; p++)
 		if (model_side_modelled(j->m, 2 * p + BACK))
 			j->sides = 2;
 	j->vectors = lanes_vectors((size_t)(j->sides * j->columns));
-	j->h = new_rows(j, 0, j->m->elements, e);
-	if (!j->h || (s->error && !(j->precision = new_rows(j, 1, j->m->elements, e))))
+	j->h = new_rows(j, 0, j->m->element.n, e);
+	if (!j->h || (s->error.sampling && !(j->precision = new_rows(j, 1, j->m->element.n, e))))
 		return -1;
 	if (parts & PART_DIRECT)
-		add_part(j, s->direct, 0);
+		add_part(j, s->irradiance.direct, 0);
 	if (parts & PART_CAUSTIC)
-		add_part(j, s->caustic, apart ? (size_t)s->bands : 0);
+		add_part(j, s->irradiance.caustic, apart ? (size_t)s->bands : 0);
 	if (parts & PART_INDIRECT)
-		add_part(j, s->indirect, apart ? (size_t)s->bands : 0);
-	if (s->error)
+		add_part(j, s->irradiance.indirect, apart ? (size_t)s->bands : 0);
+	if (s->error.sampling)
 		set_precisions(j, parts);
 	return 0;
 }
@@ -202,7 +202,7 @@ static int new_values(struct reconstruct_job *j, struct err *e)
 {
 	j->value = new_rows(j, 2, j->g.groups, e);
 	j->shift = new_rows(j, 3, j->g.groups, e);
-	j->rest = new_rows(j, 4, j->m->elements, e);
+	j->rest = new_rows(j, 4, j->m->element.n, e);
 	return j->value && j->shift && j->rest ? 0 : -1;
 }
 
@@ -210,13 +210,13 @@ static int set_places(struct reconstruct_job *j, struct err *e)
 {
 	const struct model *m = j->m;
 
-	j->place = mem_new(m->elements, sizeof *j->place, "elements", e);
-	for (size_t i = 0; i < m->elements && j->place; i++) {
+	j->place = mem_new(m->element.n, sizeof *j->place, "elements", e);
+	for (size_t i = 0; i < m->element.n && j->place; i++) {
 		struct reconstruct_place *p = &j->place[i];
 		for (size_t k = 0; k < 3; k++)
-			v3_mad(p->centre, 1. / 3, &m->vertex[3 * (size_t)m->element[3 * i + k]], p->centre);
-		memcpy(p->normal, &m->element_normal[3 * i], sizeof p->normal);
-		p->area = m->element_area[i];
+			v3_mad(p->centre, 1. / 3, &m->vertex[3 * (size_t)m->element.corner[3 * i + k]], p->centre);
+		memcpy(p->normal, &m->element.normal[3 * i], sizeof p->normal);
+		p->area = m->element.area[i];
 	}
 	return j->place ? 0 : -1;
 }
@@ -231,7 +231,7 @@ static int new_scratch(struct reconstruct_job *j, int threads, struct err *e)
 	j->scratch = mem_new((size_t)threads, sizeof *j->scratch, "scratch", e);
 	for (int t = 0; t < threads && j->scratch; t++) {
 		struct reconstruct_scratch *s = &j->scratch[t];
-		s->listed = mem_new(j->m->elements, sizeof *s->listed, "scratch", e);
+		s->listed = mem_new(j->m->element.n, sizeof *s->listed, "scratch", e);
 		s->met = mem_new(j->g.groups, sizeof *s->met, "scratch", e);
 		s->near = mem_new(most + RINGS * NEAR_MAX, sizeof *s->near, "scratch", e);
 		if (!s->listed || !s->met || !s->near)
@@ -251,34 +251,34 @@ static void free_job(struct reconstruct_job *j, int threads)
 	free(j->place);
 	for (size_t i = 0; i < sizeof j->room / sizeof *j->room; i++)
 		free(j->room[i]);
-	smooth_groups_free(&j->g);
+	interp_smooth_groups_free(&j->g);
 }
 
-int reconstruct(const struct model *m, const struct solution *s, unsigned parts, int threads,
-                struct reconstruction *r, struct err *e)
+int interp_reconstruct(const struct model *m, const struct solution *s, unsigned parts, int threads,
+                       struct reconstruction *r, struct err *e)
 {
 	struct reconstruct_job j = { .m = m, .s = s, .out = r };
 	int bad = -1;
 
-	*r = (struct reconstruction){ .elements = m->elements, .bands = s->bands };
-	if (s->element_sides != 2 * m->elements)
+	*r = (struct reconstruction){ .elements = m->element.n, .bands = s->bands };
+	if (s->element_sides != 2 * m->element.n)
 		return err_set(e, "the solution has %zu element-sides, its model %zu",
-		               s->element_sides, 2 * m->elements);
-	if (m->elements <= SIZE_MAX / (6 * BANDS_MAX))
-		r->corner = mem_new(m->elements * 6 * (size_t)s->bands, sizeof *r->corner,
+		               s->element_sides, 2 * m->element.n);
+	if (m->element.n <= SIZE_MAX / (6 * BANDS_MAX))
+		r->corner = mem_new(m->element.n * 6 * (size_t)s->bands, sizeof *r->corner,
 		                    "irradiance at corners", e);
-	if (r->corner && !set_columns(&j, parts, e) && !smooth_groups_new(m, COS_CREASE, &j.g, e) &&
+	if (r->corner && !set_columns(&j, parts, e) && !interp_smooth_groups_new(m, COS_CREASE, &j.g, e) &&
 	    !new_values(&j, e) && !set_places(&j, e) && !new_scratch(&j, threads, e)) {
 		run(&j, threads);
 		bad = 0;
 	}
 	free_job(&j, threads);
 	if (bad)
-		reconstruction_free(r);
+		interp_reconstruction_free(r);
 	return bad;
 }
 
-void reconstruction_free(struct reconstruction *r)
+void interp_reconstruction_free(struct reconstruction *r)
 {
 	free(r->corner);
 	*r = (struct reconstruction){ 0 };

@@ -35,13 +35,13 @@ enum { PART_DIRECT = 1, PART_CAUSTIC = 2, PART_INDIRECT = 4, PART_ALL = 7 };
 /* Interpolates the sum of the parts of a mask. s->error, of the sum of all, stands for that
  * of any; it may be NULL (exact values). Light groups are summed. O(elements), the
  * same result for any number of threads. 0, or -1 and e. */
-int reconstruct(const struct model *m, const struct solution *s, unsigned parts, int threads,
-                struct reconstruction *r, struct err *e);
-void reconstruction_free(struct reconstruction *r);
+int interp_reconstruct(const struct model *m, const struct solution *s, unsigned parts, int threads,
+                       struct reconstruction *r, struct err *e);
+void interp_reconstruction_free(struct reconstruction *r);
 
 /* H of one side at the point of `element` with corner weights w, into h[bands]. */
-static inline void reconstruction_at(const struct reconstruction *r, size_t element,
-                                     int side, const double w[3], double *h)
+static inline void interp_reconstruction_at(const struct reconstruction *r, size_t element,
+                                            int side, const double w[3], double *h)
 {
 	size_t bands = (size_t)r->bands, n = 2 * bands;
 	const float *c = r->corner + 3 * n * element + (size_t)side * bands;

@@ -224,7 +224,7 @@ static void average(const struct reconstruct_job *j, const struct reconstruct_sc
 /* Vectors that the sides modelled of a group's elements fill. */
 static size_t group_vectors(const struct reconstruct_job *j, uint32_t element)
 {
-	int two = j->sides == 2 && model_side_modelled(j->m, 2 * j->m->element_patch[element] + BACK);
+	int two = j->sides == 2 && model_side_modelled(j->m, 2 * j->m->element.patch[element] + BACK);
 
 	return lanes_vectors((size_t)j->columns << two);
 }
@@ -233,7 +233,7 @@ static size_t group_vectors(const struct reconstruct_job *j, uint32_t element)
 static void solve_group(const struct reconstruct_job *j, struct reconstruct_scratch *s, size_t group)
 {
 	uint32_t corner = j->g.corner[j->g.start[group]];
-	const double *vertex = &j->m->vertex[3 * (size_t)j->m->element[corner]];
+	const double *vertex = &j->m->vertex[3 * (size_t)j->m->element.corner[corner]];
 	size_t vectors = group_vectors(j, corner / 3), begin = 0;
 	lanes *value = j->value + group * j->vectors;
 	struct fit f = { 0 };
@@ -269,7 +269,7 @@ static void solve_group(const struct reconstruct_job *j, struct reconstruct_scra
 	average(j, s, f.ring1, vectors, value);
 }
 
-void reconstruct_fit(void *arg, size_t begin, size_t end, int thread)
+void interp_reconstruct_fit(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct reconstruct_job *j = arg;
 

@@ -1,4 +1,4 @@
-/* What reconstruct.c and reconstruct_fit.c share. */
+/* What reconstruct.c and interp_reconstruct_fit.c share. */
 #ifndef TWOPASS_RECONSTRUCT_INTERNAL_H
 #define TWOPASS_RECONSTRUCT_INTERNAL_H
 
@@ -59,6 +59,6 @@ struct reconstruct_job {
 };
 
 /* Fits the values at the vertices of groups [begin, end) of a struct reconstruct_job; for par_for. */
-void reconstruct_fit(void *job, size_t begin, size_t end, int thread);
+void interp_reconstruct_fit(void *job, size_t begin, size_t end, int thread);
 
 #endif

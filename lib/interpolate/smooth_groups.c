@@ -43,18 +43,18 @@ static void join(uint32_t *parent, uint32_t a, uint32_t b)
 static uint32_t sort_corners(struct builder *b)
 {
 	const struct model *m = b->m;
-	size_t n = 3 * m->elements;
+	size_t n = 3 * m->element.n;
 	uint32_t most = 0;
 
 	for (size_t i = 0; i < n; i++)
-		b->start[m->element[i] + 1]++;
+		b->start[m->element.corner[i] + 1]++;
 	for (size_t v = 0; v < m->vertices; v++) {
 		if (b->start[v + 1] > most)
 			most = b->start[v + 1];
 		b->start[v + 1] += b->start[v];
 	}
 	for (size_t i = n; i-- > 0;) /* backwards: fills each vertex from its end */
-		b->corner[--b->start[m->element[i] + 1]] = (uint32_t)i;
+		b->corner[--b->start[m->element.corner[i] + 1]] = (uint32_t)i;
 	for (size_t v = 0; v < m->vertices; v++)
 		b->start[v] = b->start[v + 1];
 	b->start[m->vertices] = (uint32_t)n;
@@ -91,7 +91,7 @@ static void sort_spokes(struct spoke *spoke, size_t n)
 
 static int is_smooth(const struct builder *b, uint32_t c, uint32_t d)
 {
-	const double *n = b->m->element_normal;
+	const double *n = b->m->element.normal;
 	return v3_dot(&n[3 * (size_t)(c / 3)], &n[3 * (size_t)(d / 3)]) > b->cos_crease;
 }
 
@@ -105,10 +105,10 @@ static void join_at_vertex(struct builder *b, size_t v)
 
 	for (uint32_t i = b->start[v]; i < b->start[v + 1]; i++) {
 		uint32_t c = b->corner[i], first = c - c % 3;
-		uint64_t surface = m->patch_surface[m->element_patch[c / 3]];
+		uint64_t surface = m->patch.surface[m->element.patch[c / 3]];
 		for (uint32_t k = 1; k < 3; k++)
 			b->spoke[n++] = (struct spoke){
-				surface << 32 | m->element[first + (c + k - first) % 3], c };
+				surface << 32 | m->element.corner[first + (c + k - first) % 3], c };
 	}
 	sort_spokes(b->spoke, n);
 	for (size_t i = 1; i < n; i++)
@@ -123,7 +123,7 @@ static void join_at_vertex(struct builder *b, size_t v)
 /* Numbers the roots and sorts the corners by group. */
 static int collect(struct builder *b, struct smooth_groups *g, struct err *e)
 {
-	size_t n = 3 * b->m->elements;
+	size_t n = 3 * b->m->element.n;
 
 	for (size_t i = 0; i < n; i++) {
 		uint32_t r = root(b->parent, (uint32_t)i);
@@ -141,16 +141,16 @@ static int collect(struct builder *b, struct smooth_groups *g, struct err *e)
 	return 0;
 }
 
-int smooth_groups_new(const struct model *m, double cos_crease, struct smooth_groups *g,
-                      struct err *e)
+int interp_smooth_groups_new(const struct model *m, double cos_crease, struct smooth_groups *g,
+                             struct err *e)
 {
 	struct builder b = { .m = m, .cos_crease = cos_crease };
-	size_t n = 3 * m->elements;
+	size_t n = 3 * m->element.n;
 	int bad = -1;
 
 	*g = (struct smooth_groups){ 0 };
-	if (m->elements > (UINT32_MAX - 2) / 3)
-		return err_set(e, "%zu elements are too many to interpolate", m->elements);
+	if (m->element.n > (UINT32_MAX - 2) / 3)
+		return err_set(e, "%zu elements are too many to interpolate", m->element.n);
 	b.start = mem_new(m->vertices + 2, sizeof *b.start, "corners by vertex", e);
 	b.corner = mem_new(n, sizeof *b.corner, "corners by vertex", e);
 	b.parent = mem_new(n, sizeof *b.parent, "smooth groups", e);
@@ -170,11 +170,11 @@ int smooth_groups_new(const struct model *m, double cos_crease, struct smooth_gr
 	free(b.parent);
 	free(b.spoke);
 	if (bad)
-		smooth_groups_free(g);
+		interp_smooth_groups_free(g);
 	return bad;
 }
 
-void smooth_groups_free(struct smooth_groups *g)
+void interp_smooth_groups_free(struct smooth_groups *g)
 {
 	free(g->group);
 	free(g->start);

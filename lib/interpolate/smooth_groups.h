@@ -19,8 +19,8 @@ struct smooth_groups {
 };
 
 /* O(elements log(valence)). 0, or -1 and e. */
-int smooth_groups_new(const struct model *m, double cos_crease, struct smooth_groups *g,
-                      struct err *e);
-void smooth_groups_free(struct smooth_groups *g);
+int interp_smooth_groups_new(const struct model *m, double cos_crease, struct smooth_groups *g,
+                             struct err *e);
+void interp_smooth_groups_free(struct smooth_groups *g);
 
 #endif

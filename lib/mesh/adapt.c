@@ -45,9 +45,9 @@ struct plan {
  * from emitters has hardly any noise. */
 static double certain(const struct solution *s, size_t at)
 {
-	double direct = s->discretisation_direct[at] * s->discretisation_direct[at];
-	double other = s->discretisation[at] * s->discretisation[at] - direct;
-	double noise = s->error[at] * s->error[at] - s->error_direct[at] * s->error_direct[at];
+	double direct = s->error.discretisation_direct[at] * s->error.discretisation_direct[at];
+	double other = s->error.discretisation[at] * s->error.discretisation[at] - direct;
+	double noise = s->error.sampling[at] * s->error.sampling[at] - s->error.sampling_direct[at] * s->error.sampling_direct[at];
 
 	return direct + fmax(0, other - doubtful * fmax(0, noise));
 }
@@ -58,9 +58,9 @@ static double side_energy(const struct model *m, const struct solution *s, size_
                           int side)
 {
 	const struct materials *mt = &m->material;
-	uint32_t material = model_patch_material(m, m->element_patch[element]);
-	size_t bands = (size_t)m->bands, here = material_at(mt, material, side);
-	size_t there = material_at(mt, material, !side), es = 2 * element + (size_t)side;
+	uint32_t material = model_patch_material(m, m->element.patch[element]);
+	size_t bands = (size_t)m->bands, here = model_material_at(mt, material, side);
+	size_t there = model_material_at(mt, material, !side), es = 2 * element + (size_t)side;
 	double sum = 0;
 
 	for (size_t k = 0; k < bands; k++) {
@@ -70,7 +70,7 @@ static double side_energy(const struct model *m, const struct solution *s, size_
 		if (across > 0)
 			sum += across * across * certain(s, (es ^ 1) * bands + k);
 	}
-	return m->element_area[element] * sum;
+	return m->element.area[element] * sum;
 }
 
 /* Energies, over the square of the mean exitance, and that an error of 1 would have. */
@@ -79,20 +79,20 @@ static double find_energies(struct plan *p, const struct solution *s)
 	const struct model *m = p->m;
 	double area = 0, sum = 0;
 
-	for (size_t i = 0; i < m->elements; i++)
+	for (size_t i = 0; i < m->element.n; i++)
 		for (int side = 0; side < 2; side++) {
-			if (!model_side_modelled(m, 2 * m->element_patch[i] + (uint32_t)side))
+			if (!model_side_modelled(m, 2 * m->element.patch[i] + (uint32_t)side))
 				continue;
-			area += m->element_area[i];
+			area += m->element.area[i];
 			p->energy[i] += side_energy(m, s, i, side);
 			for (int k = 0; k < m->bands; k++)
-				sum += m->element_area[i] *
+				sum += m->element.area[i] *
 				       solution_exitance(m, s, 2 * i + (size_t)side, k);
 		}
 	double mean = area > 0 ? sum / area / m->bands : 0;
-	for (size_t i = 0; i < m->elements; i++)
+	for (size_t i = 0; i < m->element.n; i++)
 		p->energy[i] = mean > 0 ? p->energy[i] / (mean * mean) : 0;
-	for (size_t i = 0; i < m->patches; i++) {
+	for (size_t i = 0; i < m->patch.n; i++) {
 		p->lobe_energy[i] = mean > 0 ? p->lobe_energy[i] / (mean * mean) : 0;
 		p->patch_energy[i] = p->lobe_energy[i] +
 		                     (mean > 0 ? p->patch_energy[i] / (mean * mean) : 0);
@@ -105,8 +105,8 @@ static double longest(const struct model *m, size_t element)
 	double longest = 0, d[3];
 
 	for (size_t k = 0; k < 3; k++) {
-		v3_sub(&m->vertex[3 * (size_t)m->element[3 * element + (k + 1) % 3]],
-		       &m->vertex[3 * (size_t)m->element[3 * element + k]], d);
+		v3_sub(&m->vertex[3 * (size_t)m->element.corner[3 * element + (k + 1) % 3]],
+		       &m->vertex[3 * (size_t)m->element.corner[3 * element + k]], d);
 		longest = fmax(longest, v3_length(d));
 	}
 	return longest;
@@ -114,7 +114,7 @@ static double longest(const struct model *m, size_t element)
 
 static void find_room(struct plan *p, double smallest)
 {
-	for (size_t i = 0; i < p->m->elements; i++) {
+	for (size_t i = 0; i < p->m->element.n; i++) {
 		double edge = longest(p->m, i);
 		while (p->most[i] < HALVINGS_MAX && edge >= smallest * sqrt(2) * (1 - 1e-9)) {
 			edge /= sqrt(2);
@@ -136,7 +136,7 @@ static uint8_t halvings(double energy, uint8_t most, double bound)
 /* Halvings of the elements of a patch that leave enough of them in its parts. */
 static uint8_t halvings_with(const struct plan *p, uint32_t patch)
 {
-	double elements = p->m->patch_start[patch + 1] - p->m->patch_start[patch];
+	double elements = p->m->patch.start[patch + 1] - p->m->patch.start[patch];
 	double wanted = p->patch_halvings[patch] + log2(ELEMENTS_A_PATCH / elements);
 
 	return p->patch_halvings[patch] && wanted > .5 ? (uint8_t)fmin(HALVINGS_MAX, wanted + .5) : 0;
@@ -152,12 +152,12 @@ static double expect(struct plan *p, double bound, size_t *elements)
 	for (int n = 0; n < HALVINGS_MAX; n++)
 		kept[n + 1] = kept[n] * left;
 	*elements = 0;
-	for (uint32_t i = 0; i < m->patches; i++) {
+	for (uint32_t i = 0; i < m->patch.n; i++) {
 		uint8_t n = halvings(p->patch_energy[i], HALVINGS_MAX, bound), with;
 		p->patch_halvings[i] = n;
 		with = halvings_with(p, i);
 		sum += p->patch_energy[i] * kept[n];
-		for (uint32_t k = m->patch_start[i]; k < m->patch_start[i + 1]; k++) {
+		for (uint32_t k = m->patch.start[i]; k < m->patch.start[i + 1]; k++) {
 			n = halvings(p->energy[k], p->most[k], bound);
 			if (n < with)
 				n = with < p->most[k] ? with : p->most[k];
@@ -176,9 +176,9 @@ static double find_bound(struct plan *p)
 	double low = 0, high = 0;
 	size_t elements;
 
-	for (size_t i = 0; i < p->m->elements; i++)
+	for (size_t i = 0; i < p->m->element.n; i++)
 		high = fmax(high, p->energy[i]);
-	for (size_t i = 0; i < p->m->patches; i++)
+	for (size_t i = 0; i < p->m->patch.n; i++)
 		high = fmax(high, p->patch_energy[i]);
 	double least = ldexp(high, -BISECTIONS);
 	for (int i = 0; i < BISECTIONS; i++) {
@@ -208,16 +208,16 @@ static double stuck(const struct plan *p)
 {
 	double sum = 0, all = 1 - pow(left, HALVINGS_MAX);
 
-	for (size_t i = 0; i < p->m->elements; i++)
+	for (size_t i = 0; i < p->m->element.n; i++)
 		sum += p->energy[i] * (1 - (1 - pow(left, p->most[i])) / all);
 	return sum;
 }
 
 static int find_patch_energies(struct plan *p, const struct solution *s, struct err *e)
 {
-	struct patch_frame *frame = patch_frames(p->m, e);
-	int status = frame && !patch_energies(p->m, s, frame, p->patch_energy, e) &&
-	             !lobe_energies(p->m, s, frame, p->lobe_energy, e) ? 0 : -1;
+	struct patch_frame *frame = mesh_patch_frames(p->m, e);
+	int status = frame && !mesh_patch_energies(p->m, s, frame, p->patch_energy, e) &&
+	             !mesh_lobe_energies(p->m, s, frame, p->lobe_energy, e) ? 0 : -1;
 
 	free(frame);
 	return status;
@@ -227,28 +227,28 @@ static int allocate(struct plan *p, struct err *e)
 {
 	const struct model *m = p->m;
 
-	p->energy = mem_new(m->elements, sizeof *p->energy, "errors of elements", e);
-	p->patch_energy = mem_new(m->patches, sizeof *p->patch_energy, "errors of patches", e);
-	p->lobe_energy = mem_new(m->patches, sizeof *p->lobe_energy, "errors of patches", e);
-	p->most = mem_new(m->elements, sizeof *p->most, "errors of elements", e);
+	p->energy = mem_new(m->element.n, sizeof *p->energy, "errors of elements", e);
+	p->patch_energy = mem_new(m->patch.n, sizeof *p->patch_energy, "errors of patches", e);
+	p->lobe_energy = mem_new(m->patch.n, sizeof *p->lobe_energy, "errors of patches", e);
+	p->most = mem_new(m->element.n, sizeof *p->most, "errors of elements", e);
 	return p->energy && p->patch_energy && p->lobe_energy && p->most ? 0 : -1;
 }
 
 /* What is more than the bound. Of a patch the larger part of its energy is the reason. */
-static void count_marked(const struct plan *p, double bound, struct mesher_report *r)
+static void count_marked(const struct plan *p, double bound, struct mesh_report *r)
 {
-	for (size_t i = 0; i < p->m->elements; i++)
+	for (size_t i = 0; i < p->m->element.n; i++)
 		r->marked += p->energy[i] > bound && p->most[i] > 0;
-	for (size_t i = 0; i < p->m->patches; i++) {
+	for (size_t i = 0; i < p->m->patch.n; i++) {
 		r->patches_marked += p->patch_energy[i] > bound;
 		r->patches_for_lobes += p->patch_energy[i] > bound &&
 		                        p->lobe_energy[i] > .5 * p->patch_energy[i];
 	}
 }
 
-int adapt_plan(const struct model *m, const struct solution *s, const struct mesher_refinement *o,
-               double smallest, uint8_t *halving, uint8_t *patch_halving,
-               struct mesher_report *r, struct err *e)
+int mesh_adapt_plan(const struct model *m, const struct solution *s, const struct mesh_refinement *o,
+                    double smallest, uint8_t *halving, uint8_t *patch_halving,
+                    struct mesh_report *r, struct err *e)
 {
 	struct plan p = { .m = m, .elements = o->elements, .halvings = halving,
 		          .patch_halvings = patch_halving };
@@ -258,8 +258,8 @@ int adapt_plan(const struct model *m, const struct solution *s, const struct mes
 	if (!status) {
 		double unit = find_energies(&p, s);
 		find_room(&p, smallest);
-		double own = total(p.energy, m->elements);
-		double others = total(p.patch_energy, m->patches);
+		double own = total(p.energy, m->element.n);
+		double others = total(p.patch_energy, m->patch.n);
 		double stays = stuck(&p);
 		p.allowed = stays + fmax(o->error * o->error * unit, once * (own + others - stays));
 		double bound = own + others <= p.allowed ? INFINITY : find_bound(&p);

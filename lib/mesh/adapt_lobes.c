@@ -43,7 +43,7 @@ static int add_shiny(const struct model *m, uint32_t ps, struct vec *list, struc
 {
 	const struct materials *mt = &m->material;
 	uint32_t material = model_patch_material(m, ps >> 1);
-	size_t at = material_at(mt, material, (int)(ps & 1));
+	size_t at = model_material_at(mt, material, (int)(ps & 1));
 	struct shiny x = { .patch = ps >> 1, .sign = ps & 1 ? -1 : 1 };
 	const double *coefficient[2] = { &mt->rho_s[at], &mt->tau_s[at] };
 
@@ -51,7 +51,7 @@ static int add_shiny(const struct model *m, uint32_t ps, struct vec *list, struc
 	x.exponent[1] = mt->beta[2 * material + (ps & 1)];
 	for (int k = 0; k < 2; k++)
 		x.share[k] = isfinite(x.exponent[k]) ? mean_square(coefficient[k], m->bands) : 0;
-	return x.share[0] + x.share[1] > 0 ? vec_append(list, &x, 1, sizeof x, e) : 0;
+	return x.share[0] + x.share[1] > 0 ? mem_append(list, &x, 1, sizeof x, e) : 0;
 }
 
 /* The part of the squared deviations of patch-side q that the lobes of x make an error, as if
@@ -67,12 +67,12 @@ static double smeared(const struct model *m, const struct patch_frame *frame, ui
 	double arrives = -v3_dot(there->normal, d) * x->sign;
 	if (!(leaving > 0 && arrives > 0))
 		return 0;
-	double factor = leaving * arrives / d2 * m->patch_area[x->patch] /
-	                (PI * d2 + m->patch_area[x->patch]);
+	double factor = leaving * arrives / d2 * m->patch.area[x->patch] /
+	                (PI * d2 + m->patch.area[x->patch]);
 	for (int k = 0; k < 2; k++)
 		if (x->share[k] > 0)
 			sum += x->share[k] *
-			       fmin(1, x->exponent[k] * m->patch_area[q >> 1] / (12 * d2));
+			       fmin(1, x->exponent[k] * m->patch.area[q >> 1] / (12 * d2));
 	return factor * sum;
 }
 
@@ -82,26 +82,26 @@ static double find_deviations(const struct model *m, const struct solution *s,
 {
 	double sum = 0;
 
-	for (uint32_t q = 0; q < 2 * m->patches; q++)
+	for (uint32_t q = 0; q < 2 * m->patch.n; q++)
 		if (model_side_modelled(m, q))
-			sum += deviation[q] = patch_deviations(m, s, q >> 1, (int)(q & 1));
+			sum += deviation[q] = mesh_patch_deviations(m, s, q >> 1, (int)(q & 1));
 	return sum;
 }
 
-int lobe_energies(const struct model *m, const struct solution *s,
-                  const struct patch_frame *frame, double *energy, struct err *e)
+int mesh_lobe_energies(const struct model *m, const struct solution *s,
+                       const struct patch_frame *frame, double *energy, struct err *e)
 {
 	struct vec list = { 0 };
-	double *deviation = mem_new(2 * m->patches, sizeof *deviation, "patches", e);
+	double *deviation = mem_new(2 * m->patch.n, sizeof *deviation, "patches", e);
 	int status = deviation ? 0 : -1;
 
-	for (uint32_t ps = 0; !status && ps < 2 * m->patches; ps++)
+	for (uint32_t ps = 0; !status && ps < 2 * m->patch.n; ps++)
 		if (model_side_modelled(m, ps))
 			status = add_shiny(m, ps, &list, e);
 	const struct shiny *shiny = list.data;
 	if (!status && list.n) {
-		double least = notable * find_deviations(m, s, deviation) / (2 * (double)m->patches);
-		for (uint32_t q = 0; q < 2 * m->patches; q++) {
+		double least = notable * find_deviations(m, s, deviation) / (2 * (double)m->patch.n);
+		for (uint32_t q = 0; q < 2 * m->patch.n; q++) {
 			double sum = 0;
 			if (!(deviation[q] > least))
 				continue;

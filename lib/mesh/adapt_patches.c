@@ -27,20 +27,20 @@ struct search {
 	struct err *e;
 };
 
-struct patch_frame *patch_frames(const struct model *m, struct err *e)
+struct patch_frame *mesh_patch_frames(const struct model *m, struct err *e)
 {
-	struct patch_frame *frame = mem_new(m->patches, sizeof *frame, "patches", e);
+	struct patch_frame *frame = mem_new(m->patch.n, sizeof *frame, "patches", e);
 
-	for (uint32_t i = 0; frame && i < m->elements; i++) {
-		uint32_t p = m->element_patch[i];
-		double part = m->element_area[i] / (3 * m->patch_area[p]);
+	for (uint32_t i = 0; frame && i < m->element.n; i++) {
+		uint32_t p = m->element.patch[i];
+		double part = m->element.area[i] / (3 * m->patch.area[p]);
 		for (size_t k = 0; k < 3; k++)
-			v3_mad(frame[p].centre, part, &m->vertex[3 * (size_t)m->element[3 * i + k]],
+			v3_mad(frame[p].centre, part, &m->vertex[3 * (size_t)m->element.corner[3 * i + k]],
 			       frame[p].centre);
-		v3_mad(frame[p].normal, m->element_area[i], &m->element_normal[3 * (size_t)i],
+		v3_mad(frame[p].normal, m->element.area[i], &m->element.normal[3 * (size_t)i],
 		       frame[p].normal);
 	}
-	for (uint32_t p = 0; frame && p < m->patches; p++)
+	for (uint32_t p = 0; frame && p < m->patch.n; p++)
 		v3_normalise(frame[p].normal);
 	return frame;
 }
@@ -49,24 +49,24 @@ static int prepare(struct search *s)
 {
 	const struct model *m = s->m;
 
-	s->corner = mem_new(m->patches, 6 * sizeof *s->corner, "patches", s->e);
-	s->triangle = mem_new(m->patches, 3 * sizeof *s->triangle, "patches", s->e);
+	s->corner = mem_new(m->patch.n, 6 * sizeof *s->corner, "patches", s->e);
+	s->triangle = mem_new(m->patch.n, 3 * sizeof *s->triangle, "patches", s->e);
 	if (!s->corner || !s->triangle)
 		return -1;
-	for (uint32_t p = 0; p < m->patches; p++) {
+	for (uint32_t p = 0; p < m->patch.n; p++) {
 		double *lo = &s->corner[6 * (size_t)p], *hi = lo + 3;
 		for (size_t k = 0; k < 3; k++) {
 			lo[k] = INFINITY, hi[k] = -INFINITY;
 			s->triangle[3 * (size_t)p + k] = 2 * p + (k > 0);
 		}
-		for (size_t i = 3 * (size_t)m->patch_start[p]; i < 3 * (size_t)m->patch_start[p + 1]; i++)
+		for (size_t i = 3 * (size_t)m->patch.start[p]; i < 3 * (size_t)m->patch.start[p + 1]; i++)
 			for (size_t k = 0; k < 3; k++) {
-				double x = m->vertex[3 * (size_t)m->element[i] + k];
+				double x = m->vertex[3 * (size_t)m->element.corner[i] + k];
 				lo[k] = fmin(lo[k], x);
 				hi[k] = fmax(hi[k], x);
 			}
 	}
-	return boxes_build(&s->boxes, s->corner, s->triangle, m->patches, s->e);
+	return geo_boxes_build(&s->boxes, s->corner, s->triangle, m->patch.n, s->e);
 }
 
 /* Is any patch that is not in the plane of p, nor behind it, close to the side? -1: e. */
@@ -75,8 +75,8 @@ static int is_close(struct search *s, uint32_t p, int side)
 	double sign = side == FRONT ? 1 : -1, d[3];
 
 	s->found.n = 0;
-	if (boxes_find(&s->boxes, &s->boxes.box[p], reach * sqrt(s->m->patch_area[p]), &s->found,
-	               s->e))
+	if (geo_boxes_find(&s->boxes, &s->boxes.box[p], reach * sqrt(s->m->patch.area[p]), &s->found,
+	                   s->e))
 		return -1;
 	const uint32_t *q = s->found.data;
 	for (size_t i = 0; i < s->found.n; i++) {
@@ -89,42 +89,42 @@ static int is_close(struct search *s, uint32_t p, int side)
 	return 0;
 }
 
-double patch_deviations(const struct model *m, const struct solution *s, uint32_t p, int side)
+double mesh_patch_deviations(const struct model *m, const struct solution *s, uint32_t p, int side)
 {
 	const struct materials *mt = &m->material;
-	size_t here = material_at(mt, model_patch_material(m, p), side), bands = (size_t)m->bands;
+	size_t here = model_material_at(mt, model_patch_material(m, p), side), bands = (size_t)m->bands;
 	double all = 0;
 
 	for (size_t k = 0; k < bands; k++) {
 		double sum = 0, square = 0, noise = 0;
-		for (size_t i = m->patch_start[p]; i < m->patch_start[p + 1]; i++) {
+		for (size_t i = m->patch.start[p]; i < m->patch.start[p + 1]; i++) {
 			size_t es = 2 * i + (size_t)side;
-			double a = m->element_area[i], x = solution_exitance(m, s, es, (int)k);
-			double error = mt->rho_d[here + k] * s->error[es * bands + k];
+			double a = m->element.area[i], x = solution_exitance(m, s, es, (int)k);
+			double error = mt->rho_d[here + k] * s->error.sampling[es * bands + k];
 			sum += a * x;
 			square += a * x * x;
 			noise += a * error * error;
 		}
-		all += fmax(0, square - sum * sum / m->patch_area[p] - noise);
+		all += fmax(0, square - sum * sum / m->patch.area[p] - noise);
 	}
 	return all;
 }
 
-int patch_energies(const struct model *m, const struct solution *s,
-                   const struct patch_frame *frame, double *energy, struct err *e)
+int mesh_patch_energies(const struct model *m, const struct solution *s,
+                        const struct patch_frame *frame, double *energy, struct err *e)
 {
 	struct search search = { .m = m, .frame = frame, .e = e };
 	int status = prepare(&search);
 
-	for (uint32_t ps = 0; !status && ps < 2 * m->patches; ps++) {
+	for (uint32_t ps = 0; !status && ps < 2 * m->patch.n; ps++) {
 		int close = model_side_modelled(m, ps) ? is_close(&search, ps >> 1, (int)(ps & 1)) : 0;
 		status = close < 0 ? -1 : 0;
 		if (close > 0)
-			energy[ps >> 1] += arriving * patch_deviations(m, s, ps >> 1, (int)(ps & 1));
+			energy[ps >> 1] += arriving * mesh_patch_deviations(m, s, ps >> 1, (int)(ps & 1));
 	}
 	free(search.corner);
 	free(search.triangle);
 	free(search.found.data);
-	boxes_free(&search.boxes);
+	geo_boxes_free(&search.boxes);
 	return status;
 }

@@ -65,7 +65,7 @@ static int heap_push(struct work *w, uint32_t side)
 	if (side_at(w, side)->queued)
 		return 0;
 	side_at(w, side)->queued = 1;
-	if (vec_append(&w->heap, &side, 1, sizeof side, w->e))
+	if (mem_append(&w->heap, &side, 1, sizeof side, w->e))
 		return -1;
 	uint32_t *h = w->heap.data;
 	size_t at = w->heap.n - 1;
@@ -102,7 +102,7 @@ static int add_side(struct work *w, uint32_t a, uint32_t b, uint32_t *out)
 	v3_sub(&x[3 * (size_t)b], &x[3 * (size_t)a], d);
 	s.length = coarse(v3_dot(d, d));
 	*out = (uint32_t)w->side.n;
-	return vec_append(&w->side, &s, 1, sizeof s, w->e);
+	return mem_append(&w->side, &s, 1, sizeof s, w->e);
 }
 
 /* The side of leaf i that is to be halved first. */
@@ -160,10 +160,10 @@ static int record_split(struct work *w, uint32_t i, uint32_t j, int k)
 	struct split s = { { ~(int32_t)i, ~(int32_t)j }, k };
 	int32_t at = (int32_t)w->split.n, parent = l[i].parent;
 
-	if (vec_append(&w->split, &s, 1, sizeof s, w->e))
+	if (mem_append(&w->split, &s, 1, sizeof s, w->e))
 		return -1;
 	if (parent < 0)
-		w->m->triangle_split[l[i].triangle] = at;
+		w->m->triangle.split[l[i].triangle] = at;
 	else
 		((struct split *)w->split.data)[parent / 2].child[parent % 2] = at;
 	l[i].parent = 2 * at;
@@ -189,7 +189,7 @@ static int halve_leaf(struct work *w, uint32_t h, uint32_t mid, const uint32_t h
 		return -1;
 	unlink_half(w, 3 * i + (uint32_t)k1);
 	new.v[k] = mid;
-	if (vec_append(&w->leaf, &new, 1, sizeof new, w->e))
+	if (mem_append(&w->leaf, &new, 1, sizeof new, w->e))
 		return -1;
 	leaf_of(w, 3 * i)->v[k1] = mid;
 	leaf_of(w, 3 * i)->halvings = new.halvings;
@@ -210,7 +210,7 @@ static int halve_side(struct work *w, uint32_t side)
 
 	for (size_t k = 0; k < 3; k++)
 		at[k] = .5 * (x[3 * (size_t)s.lo + k] + x[3 * (size_t)s.hi + k]);
-	if (vec_append(&w->vertex, at, 1, sizeof at, w->e) ||
+	if (mem_append(&w->vertex, at, 1, sizeof at, w->e) ||
 	    add_side(w, s.lo, mid, &half[0]) || add_side(w, mid, s.hi, &half[1]))
 		return -1;
 	side_at(w, side)->head = NONE;
@@ -227,25 +227,25 @@ static int begin(struct work *w, const uint32_t *corner, size_t leaves, const ui
                  const uint8_t *halvings)
 {
 	struct model *m = w->m;
-	struct edges g;
+	struct half_edges g;
 	uint32_t side;
 
-	if (edges_build(&g, corner, leaves, m->vertices, w->e))
+	if (geo_half_edges_build(&g, corner, leaves, m->vertices, w->e))
 		return -1;
-	int status = vec_append(&w->vertex, m->vertex, m->vertices, 3 * sizeof(double), w->e);
+	int status = mem_append(&w->vertex, m->vertex, m->vertices, 3 * sizeof(double), w->e);
 	for (uint32_t i = 0; !status && i < leaves; i++) {
 		struct leaf l = { .triangle = triangle ? triangle[i] : i, .parent = -1,
 			          .origin = i, .halvings = halvings ? halvings[i] : 0 };
 		memcpy(l.v, &corner[3 * (size_t)i], sizeof l.v);
-		status = vec_append(&w->leaf, &l, 1, sizeof l, w->e);
+		status = mem_append(&w->leaf, &l, 1, sizeof l, w->e);
 	}
 	for (size_t i = 0; !status && i < g.n; i++) {
 		uint32_t h = g.use[g.start[i]];
-		status = add_side(w, half_from(corner, h), half_to(corner, h), &side);
+		status = add_side(w, geo_half_edge_from(corner, h), geo_half_edge_to(corner, h), &side);
 		for (uint32_t u = g.start[i]; !status && u < g.start[i + 1]; u++)
 			link_half(w, g.use[u], side);
 	}
-	edges_free(&g);
+	geo_half_edges_free(&g);
 	for (uint32_t i = 0; !status && i < leaves; i++)
 		status = queue_leaf(w, i);
 	return status;
@@ -256,11 +256,11 @@ static int begin_triangles(struct work *w)
 {
 	struct model *m = w->m;
 
-	m->triangle_split = mem_new(m->triangles, sizeof *m->triangle_split, "split trees",
+	m->triangle.split = mem_new(m->triangle.n, sizeof *m->triangle.split, "split trees",
 	                            w->e);
-	for (size_t t = 0; m->triangle_split && t < m->triangles; t++)
-		m->triangle_split[t] = ~(int32_t)t;
-	return m->triangle_split ? begin(w, m->triangle, m->triangles, NULL, NULL) : -1;
+	for (size_t t = 0; m->triangle.split && t < m->triangle.n; t++)
+		m->triangle.split[t] = ~(int32_t)t;
+	return m->triangle.split ? begin(w, m->triangle.corner, m->triangle.n, NULL, NULL) : -1;
 }
 
 /* The elements are leaves of the trees that there are. */
@@ -268,8 +268,8 @@ static int begin_elements(struct work *w, const uint8_t *halvings)
 {
 	struct model *m = w->m;
 
-	if (begin(w, m->element, m->elements, m->element_triangle, halvings) ||
-	    vec_append(&w->split, m->split, m->splits, sizeof *m->split, w->e))
+	if (begin(w, m->element.corner, m->element.n, m->element.triangle, halvings) ||
+	    mem_append(&w->split, m->split, m->splits, sizeof *m->split, w->e))
 		return -1;
 	for (size_t i = 0; i < 2 * m->splits; i++) {
 		int32_t child = m->split[i / 2].child[i % 2];
@@ -323,14 +323,14 @@ static int finish(struct work *w, uint32_t *origin)
 	uint32_t *element = mem_new(w->leaf.n, 3 * sizeof *element, "elements", w->e);
 	uint32_t *triangle = mem_new(w->leaf.n, sizeof *triangle, "elements", w->e);
 
-	free(m->element);
-	free(m->element_triangle);
-	m->element = element;
-	m->element_triangle = triangle;
+	free(m->element.corner);
+	free(m->element.triangle);
+	m->element.corner = element;
+	m->element.triangle = triangle;
 	if (!element || !triangle)
 		return -1;
-	m->elements = w->leaf.n;
-	for (size_t i = 0; i < m->elements; i++) {
+	m->element.n = w->leaf.n;
+	for (size_t i = 0; i < m->element.n; i++) {
 		memcpy(&element[3 * i], l[i].v, sizeof l[i].v);
 		triangle[i] = l[i].triangle;
 		if (origin)
@@ -355,24 +355,24 @@ static void release(struct work *w)
 	free(w->heap.data);
 }
 
-int check_element_size(const struct model *m, double size, struct err *e)
+int mesh_check_element_size(const struct model *m, double size, struct err *e)
 {
 	double area = 0, a[3];
 
-	for (size_t t = 0; t < m->triangles; t++) {
-		const uint32_t *c = &m->triangle[3 * t];
+	for (size_t t = 0; t < m->triangle.n; t++) {
+		const uint32_t *c = &m->triangle.corner[3 * t];
 		v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
 		        &m->vertex[3 * (size_t)c[2]], a);
 		area += v3_length(a);
 	}
 	double elements = area / (sqrt(3) / 4 * size * size);
-	if (elements <= ELEMENTS_MAX && m->triangles <= ELEMENTS_MAX)
+	if (elements <= ELEMENTS_MAX && m->triangle.n <= ELEMENTS_MAX)
 		return 0;
 	return err_set(e, "an element size of %g m makes more than %d elements; "
 	               "use a larger one", size, ELEMENTS_MAX);
 }
 
-int subdivide(struct model *m, double size, struct err *e)
+int mesh_bisect(struct model *m, double size, struct err *e)
 {
 	struct work w = { .m = m, .e = e, .limit = size * size * (1 + 1e-8) };
 	int status = begin_triangles(&w) || halve_all(&w) || finish(&w, NULL) ? -1 : 0;
@@ -381,8 +381,8 @@ int subdivide(struct model *m, double size, struct err *e)
 	return status;
 }
 
-int subdivide_further(struct model *m, const uint8_t *halvings, uint32_t **origin,
-                      struct err *e)
+int mesh_bisect_further(struct model *m, const uint8_t *halvings, uint32_t **origin,
+                        struct err *e)
 {
 	struct work w = { .m = m, .e = e, .limit = INFINITY };
 	int status = begin_elements(&w, halvings) || halve_all(&w) ? -1 : 0;

@@ -20,9 +20,9 @@ struct shape {
 struct search {
 	struct model *m;
 	const uint32_t *position;
-	struct mesher_report *r;
+	struct mesh_report *r;
 	uint8_t *keep;        /* [triangles] */
-	uint64_t *twin;       /* [triangles], see merge_sandwiches */
+	uint64_t *twin;       /* [triangles], see mesh_merge_coincident_sheets */
 };
 
 static int compare_shapes(const void *px, const void *py)
@@ -54,15 +54,15 @@ static void sort_positions(uint32_t *p, int n)
 
 static void area_vector(const struct model *m, uint32_t t, double n[3])
 {
-	const uint32_t *c = &m->triangle[3 * (size_t)t];
+	const uint32_t *c = &m->triangle.corner[3 * (size_t)t];
 
 	v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
 	        &m->vertex[3 * (size_t)c[2]], n);
 }
 
-void note_twin(const struct model *m, uint32_t t, uint32_t kept, uint64_t *twin)
+void mesh_note_twin(const struct model *m, uint32_t t, uint32_t kept, uint64_t *twin)
 {
-	uint32_t surface = m->triangle_surface[t];
+	uint32_t surface = m->triangle.surface[t];
 	double n[3], o[3];
 
 	area_vector(m, t, n);
@@ -77,9 +77,9 @@ void note_twin(const struct model *m, uint32_t t, uint32_t kept, uint64_t *twin)
 /* Triangle t goes because `kept` fills its place. */
 static void drop(struct search *s, uint32_t t, uint32_t kept)
 {
-	uint32_t surface = s->m->triangle_surface[t];
+	uint32_t surface = s->m->triangle.surface[t];
 
-	note_twin(s->m, t, kept, s->twin);
+	mesh_note_twin(s->m, t, kept, s->twin);
 	s->keep[t] = 0;
 	if (surface < s->r->surfaces)
 		s->r->surface[surface].duplicate++;
@@ -100,17 +100,17 @@ static void drop_triangles(struct search *s, struct shape *shape, size_t n)
 static int find_triangles(struct search *s, struct err *e)
 {
 	const struct model *m = s->m;
-	struct shape *shape = mem_new(m->triangles, sizeof *shape, "duplicates", e);
+	struct shape *shape = mem_new(m->triangle.n, sizeof *shape, "duplicates", e);
 
 	if (!shape)
 		return -1;
-	for (size_t t = 0; t < m->triangles; t++) {
+	for (size_t t = 0; t < m->triangle.n; t++) {
 		shape[t].a = (uint32_t)t;
 		for (size_t k = 0; k < 3; k++)
-			shape[t].position[k] = s->position[m->triangle[3 * t + k]];
+			shape[t].position[k] = s->position[m->triangle.corner[3 * t + k]];
 		sort_positions(shape[t].position, 3);
 	}
-	drop_triangles(s, shape, m->triangles);
+	drop_triangles(s, shape, m->triangle.n);
 	free(shape);
 	return 0;
 }
@@ -121,12 +121,12 @@ static int plane_quad(const struct model *m, uint32_t g, uint32_t h)
 {
 	double n[3], o[3], d[3];
 
-	if (half_from(m->triangle, g) != half_to(m->triangle, h))
+	if (geo_half_edge_from(m->triangle.corner, g) != geo_half_edge_to(m->triangle.corner, h))
 		return 0;
 	area_vector(m, g / 3, n);
 	area_vector(m, h / 3, o);
-	v3_sub(&m->vertex[3 * (size_t)half_apex(m->triangle, h)],
-	       &m->vertex[3 * (size_t)half_from(m->triangle, g)], d);
+	v3_sub(&m->vertex[3 * (size_t)geo_half_edge_apex(m->triangle.corner, h)],
+	       &m->vertex[3 * (size_t)geo_half_edge_from(m->triangle.corner, g)], d);
 	v3_normalise(n);
 	return v3_dot(n, o) > 0 && fabs(v3_dot(n, d)) <= 1e-6 * v3_length(d);
 }
@@ -154,11 +154,11 @@ static void drop_quads(struct search *s, const struct shape *shape, size_t n)
 static int find_quads(struct search *s, struct err *e)
 {
 	const struct model *m = s->m;
-	struct edges g = { 0 };
-	struct shape *shape = mem_new(3 * m->triangles / 2 + 1, sizeof *shape, "duplicates", e);
+	struct half_edges g = { 0 };
+	struct shape *shape = mem_new(3 * m->triangle.n / 2 + 1, sizeof *shape, "duplicates", e);
 	size_t n = 0;
 
-	if (!shape || edges_build(&g, m->triangle, m->triangles, m->vertices, e)) {
+	if (!shape || geo_half_edges_build(&g, m->triangle.corner, m->triangle.n, m->vertices, e)) {
 		free(shape);
 		return -1;
 	}
@@ -167,8 +167,8 @@ static int find_quads(struct search *s, struct err *e)
 		if (g.start[i + 1] - g.start[i] != 2 || !plane_quad(m, h[0], h[1]))
 			continue;
 		struct shape q = { .a = h[0] / 3, .b = h[1] / 3 };
-		uint32_t corner[4] = { half_from(m->triangle, h[0]), half_to(m->triangle, h[0]),
-			half_apex(m->triangle, h[0]), half_apex(m->triangle, h[1]) };
+		uint32_t corner[4] = { geo_half_edge_from(m->triangle.corner, h[0]), geo_half_edge_to(m->triangle.corner, h[0]),
+			geo_half_edge_apex(m->triangle.corner, h[0]), geo_half_edge_apex(m->triangle.corner, h[1]) };
 		for (int k = 0; k < 4; k++)
 			q.position[k] = s->position[corner[k]];
 		sort_positions(q.position, 4);
@@ -181,38 +181,38 @@ static int find_quads(struct search *s, struct err *e)
 		drop_quads(s, shape + i, j - i);
 	}
 	free(shape);
-	edges_free(&g);
+	geo_half_edges_free(&g);
 	return 0;
 }
 
-int drop_duplicates(struct model *m, const uint32_t *position, struct mesher_report *r,
-                    struct err *e)
+int mesh_drop_coincident(struct model *m, const uint32_t *position, struct mesh_report *r,
+                         struct err *e)
 {
 	int status = -1;
 	struct search s = { .m = m, .position = position, .r = r };
 
-	s.keep = mem_new(m->triangles, 1, "duplicates", e);
-	s.twin = mem_new(m->triangles, sizeof *s.twin, "duplicates", e);
+	s.keep = mem_new(m->triangle.n, 1, "duplicates", e);
+	s.twin = mem_new(m->triangle.n, sizeof *s.twin, "duplicates", e);
 	if (!s.keep || !s.twin)
 		goto done;
-	memset(s.keep, 1, m->triangles);
+	memset(s.keep, 1, m->triangle.n);
 	if (find_triangles(&s, e))
 		goto done;
 	if (r->total.duplicate) {
 		/* Dropped triangles must not be halves of quads. */
-		if (merge_sandwiches(m, s.twin, s.keep, r, e))
+		if (mesh_merge_coincident_sheets(m, s.twin, s.keep, r, e))
 			goto done;
-		clean_compact(m, s.keep);
-		memset(s.keep, 1, m->triangles);
-		memset(s.twin, 0, m->triangles * sizeof *s.twin);
+		mesh_clean_compact(m, s.keep);
+		memset(s.keep, 1, m->triangle.n);
+		memset(s.twin, 0, m->triangle.n * sizeof *s.twin);
 	}
 	uint32_t before = r->total.duplicate;
 	if (find_quads(&s, e))
 		goto done;
 	if (r->total.duplicate > before) {
-		if (merge_sandwiches(m, s.twin, s.keep, r, e))
+		if (mesh_merge_coincident_sheets(m, s.twin, s.keep, r, e))
 			goto done;
-		clean_compact(m, s.keep);
+		mesh_clean_compact(m, s.keep);
 	}
 	status = 0;
 done:

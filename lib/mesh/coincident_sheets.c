@@ -11,7 +11,7 @@
 /* Kept triangles of one surface whose twins are one side of one other. */
 struct pairing {
 	uint32_t surface;
-	uint64_t twin;      /* as in merge_sandwiches */
+	uint64_t twin;      /* as in mesh_merge_coincident_sheets */
 	uint32_t triangles; /* how many */
 	uint32_t made;      /* the surface that they get */
 };
@@ -30,20 +30,20 @@ static int wants_merge(const struct model *m, const uint64_t *twin, const uint8_
                        size_t t)
 {
 	return keep[t] && twin[t] &&
-	       m->material.one_sided[m->surface.material[m->triangle_surface[t]]];
+	       m->material.one_sided[m->surface.material[m->triangle.surface[t]]];
 }
 
 static struct pairing *find_pairings(const struct model *m, const uint64_t *twin,
                                      const uint8_t *keep, size_t *n, size_t *triangles,
                                      struct err *e)
 {
-	struct pairing *p = mem_new(m->triangles, sizeof *p, "coincident surfaces", e);
+	struct pairing *p = mem_new(m->triangle.n, sizeof *p, "coincident surfaces", e);
 	size_t all = 0;
 
 	*n = 0;
-	for (size_t t = 0; p && t < m->triangles; t++)
+	for (size_t t = 0; p && t < m->triangle.n; t++)
 		if (wants_merge(m, twin, keep, t))
-			p[all++] = (struct pairing){ m->triangle_surface[t], twin[t], 1, 0 };
+			p[all++] = (struct pairing){ m->triangle.surface[t], twin[t], 1, 0 };
 	if (!p)
 		return NULL;
 	qsort(p, all, sizeof *p, compare_pairings);
@@ -117,7 +117,7 @@ static void copy_side(struct materials *out, size_t j, int to, const struct mate
                       size_t i, int from)
 {
 	size_t bytes = (size_t)in->bands * sizeof(double);
-	size_t a = material_at(in, i, from), b = material_at(out, j, to);
+	size_t a = model_material_at(in, i, from), b = model_material_at(out, j, to);
 	size_t ka = 2 * i + (size_t)from, kb = 2 * j + (size_t)to;
 
 	memcpy(&out->rho_d[b], &in->rho_d[a], bytes);
@@ -138,7 +138,7 @@ static int add_material(struct materials *mt, size_t front, size_t back, int sid
 	struct materials out;
 	size_t n = mt->n;
 
-	if (materials_new(&out, n + 1, mt->bands, e))
+	if (model_materials_new(&out, n + 1, mt->bands, e))
 		goto failed;
 	for (size_t i = 0; i < n; i++)
 		for (int s = 0; s < 2; s++)
@@ -146,7 +146,7 @@ static int add_material(struct materials *mt, size_t front, size_t back, int sid
 	copy_side(&out, n, FRONT, mt, front, FRONT);
 	copy_side(&out, n, BACK, mt, back, side);
 	for (int b = 0; b < mt->bands; b++) {
-		size_t at = material_at(&out, n, BACK) + (size_t)b;
+		size_t at = model_material_at(&out, n, BACK) + (size_t)b;
 		out.tau_d[at] = out.tau_s[at] = 0;
 	}
 	if (!(out.name[n] = join_names(mt->name[front], mt->name[back], e)))
@@ -154,11 +154,11 @@ static int add_material(struct materials *mt, size_t front, size_t back, int sid
 	memcpy(out.name, mt->name, n * sizeof *mt->name);
 	memcpy(out.one_sided, mt->one_sided, n);
 	memset(mt->name, 0, n * sizeof *mt->name);
-	materials_free(mt);
+	model_materials_free(mt);
 	*mt = out;
 	return 0;
 failed:
-	materials_free(&out);
+	model_materials_free(&out);
 	return -1;
 }
 
@@ -185,8 +185,8 @@ static uint32_t *count_kept(const struct model *m, const uint8_t *keep, struct e
 {
 	uint32_t *kept = mem_new(m->surface.n, sizeof *kept, "surfaces", e);
 
-	for (size_t t = 0; kept && t < m->triangles; t++)
-		kept[m->triangle_surface[t]] += keep[t];
+	for (size_t t = 0; kept && t < m->triangle.n; t++)
+		kept[m->triangle.surface[t]] += keep[t];
 	return kept;
 }
 
@@ -213,8 +213,8 @@ static int make_pair(struct model *m, const uint32_t *kept, struct pairing *all,
 	return 0;
 }
 
-int merge_sandwiches(struct model *m, const uint64_t *twin, const uint8_t *keep,
-                     struct mesher_report *r, struct err *e)
+int mesh_merge_coincident_sheets(struct model *m, const uint64_t *twin, const uint8_t *keep,
+                                 struct mesh_report *r, struct err *e)
 {
 	int status = -1;
 	size_t n, triangles = 0;
@@ -226,11 +226,11 @@ int merge_sandwiches(struct model *m, const uint64_t *twin, const uint8_t *keep,
 	if (!p || !before || !kept)
 		goto done;
 	memcpy(before, m->surface.material, m->surface.n * sizeof *before);
-	uint32_t *surface = m->triangle_surface;
+	uint32_t *surface = m->triangle.surface;
 	for (size_t i = 0; i < n; i++)
 		if (make_pair(m, kept, p, i, before, e))
 			goto done;
-	for (size_t t = 0; t < m->triangles; t++) {
+	for (size_t t = 0; t < m->triangle.n; t++) {
 		/* Materials may have changed under wants_merge: ask the pairings alone. */
 		struct pairing want = { surface[t], twin[t], 0, 0 }, *found = NULL;
 		if (keep[t] && twin[t])

@@ -14,7 +14,7 @@ enum { STEPS_MAX = 100000 };
 /* ---- points ---- */
 
 /* How deep a point lies in a piece: its distance from the nearest side. */
-static double depth(const struct cutter *c, uint32_t i, struct point x, uint32_t *side)
+static double depth(const struct triangulation *c, uint32_t i, struct point x, uint32_t *side)
 {
 	double least = INFINITY;
 
@@ -30,7 +30,7 @@ static double depth(const struct cutter *c, uint32_t i, struct point x, uint32_t
 
 /* The piece that holds a point of the triangle: a walk towards it, or, if that does
  * not arrive, the piece in which it lies deepest. */
-static uint32_t find_piece(const struct cutter *c, struct point x)
+static uint32_t find_piece(const struct triangulation *c, struct point x)
 {
 	uint32_t i = c->triangle, side = 0, best = i;
 	double deepest = -INFINITY;
@@ -55,14 +55,14 @@ static uint32_t find_piece(const struct cutter *c, struct point x)
 }
 
 /* The vertex at a point of the triangle: a new one, unless there is one near enough. */
-static int put_point(struct cutter *c, const double at[3], uint32_t *vertex)
+static int put_point(struct triangulation *c, const double at[3], uint32_t *vertex)
 {
 	struct point x = flat(c, at);
 	uint32_t i = find_piece(c, x), side = 0;
 	double d = depth(c, i, x, &side), foot[3], edge[3];
 
 	if (d > c->apart)
-		return add_vertex(c, at, vertex) || halve_face(c, i, *vertex) ? -1 : 0;
+		return mesh_add_vertex(c, at, vertex) || mesh_halve_face(c, i, *vertex) ? -1 : 0;
 	uint32_t ends[2] = { from(c, side), from(c, following(side)) };
 	struct point a = flat_vertex(c, ends[0]), b = flat_vertex(c, ends[1]);
 	double length = distance(a, b);
@@ -73,24 +73,24 @@ static int put_point(struct cutter *c, const double at[3], uint32_t *vertex)
 	}
 	v3_sub(place(c, ends[1]), place(c, ends[0]), edge);
 	v3_mad(place(c, ends[0]), t, edge, foot);
-	return add_vertex(c, foot, vertex) || halve_edge(c, side, *vertex) ? -1 : 0;
+	return mesh_add_vertex(c, foot, vertex) || mesh_halve_edge(c, side, *vertex) ? -1 : 0;
 }
 
 /* ---- lines ---- */
 
-static int mark(struct cutter *c, uint32_t h, uint32_t unused)
+static int mark(struct triangulation *c, uint32_t h, uint32_t unused)
 {
 	(void)unused;
 	piece_of(c, h)->line[h % 3] = 1;
 	return 0;
 }
 
-static void mark_line(struct cutter *c, uint32_t h)
+static void mark_line(struct triangulation *c, uint32_t h)
 {
 	uint32_t across = get_half(c, h).across;
 
 	if (across == RIM) {
-		along_rim(c, h, 0, mark);
+		mesh_along_rim(c, h, 0, mark);
 	} else {
 		mark(c, h, 0);
 		mark(c, across, 0);
@@ -106,7 +106,7 @@ struct way {
 };
 
 /* Looks at the piece in which half-edge h begins at the vertex u. */
-static void look(const struct cutter *c, uint32_t h, uint32_t u, uint32_t v, struct way *w)
+static void look(const struct triangulation *c, uint32_t h, uint32_t u, uint32_t v, struct way *w)
 {
 	struct point begin = flat_vertex(c, u), end = flat_vertex(c, v);
 	double length = distance(begin, end);
@@ -134,7 +134,7 @@ static void look(const struct cutter *c, uint32_t h, uint32_t u, uint32_t v, str
 }
 
 /* Looks at all pieces of the triangle about vertex u; h begins there. */
-static struct way look_around(const struct cutter *c, uint32_t h, uint32_t u, uint32_t v)
+static struct way look_around(const struct triangulation *c, uint32_t h, uint32_t u, uint32_t v)
 {
 	struct way w = { .edge = RIM, .crossed = RIM };
 	uint32_t at = h;
@@ -154,7 +154,7 @@ static struct way look_around(const struct cutter *c, uint32_t h, uint32_t u, ui
 }
 
 /* A half-edge of the triangle that begins at a vertex, or RIM. */
-static uint32_t find_corner(const struct cutter *c, uint32_t vertex)
+static uint32_t find_corner(const struct triangulation *c, uint32_t vertex)
 {
 	uint32_t i = find_piece(c, flat_vertex(c, vertex));
 
@@ -169,7 +169,7 @@ static uint32_t find_corner(const struct cutter *c, uint32_t vertex)
 }
 
 /* Halves half-edge h where the line from u to v crosses it. */
-static int cross_edge(struct cutter *c, uint32_t h, uint32_t u, uint32_t v)
+static int cross_edge(struct triangulation *c, uint32_t h, uint32_t u, uint32_t v)
 {
 	uint32_t a = from(c, h), b = from(c, following(h)), vertex;
 	struct point begin = flat_vertex(c, u), end = flat_vertex(c, v);
@@ -178,13 +178,13 @@ static int cross_edge(struct cutter *c, uint32_t h, uint32_t u, uint32_t v)
 
 	v3_sub(place(c, b), place(c, a), edge);
 	v3_mad(place(c, a), p / (p - q), edge, x);
-	return add_vertex(c, x, &vertex) || halve_edge(c, h, vertex) ? -1 : 0;
+	return mesh_add_vertex(c, x, &vertex) || mesh_halve_edge(c, h, vertex) ? -1 : 0;
 }
 
 /* Collects in c->crossed the half-edges that the line from u to v crosses, from the
  * first one on, up to a vertex on the line. *blocked = the one among them that must not
  * be flipped away, a line or a side of the triangle, or RIM. */
-static int walk_line(struct cutter *c, uint32_t h, uint32_t u, uint32_t v, uint32_t *blocked)
+static int walk_line(struct triangulation *c, uint32_t h, uint32_t u, uint32_t v, uint32_t *blocked)
 {
 	struct point begin = flat_vertex(c, u), end = flat_vertex(c, v);
 
@@ -196,7 +196,7 @@ static int walk_line(struct cutter *c, uint32_t h, uint32_t u, uint32_t v, uint3
 			*blocked = h;
 			return 0;
 		}
-		if (vec_append(&c->crossed, &h, 1, sizeof h, c->e))
+		if (mem_append(&c->crossed, &h, 1, sizeof h, c->e))
 			return -1;
 		uint32_t apex = from(c, preceding(s.across));
 		double left = left_of(begin, end, flat_vertex(c, apex));
@@ -209,7 +209,7 @@ static int walk_line(struct cutter *c, uint32_t h, uint32_t u, uint32_t v, uint3
 
 /* The crossed half-edge to flip next: one at the vertex that is furthest from the line.
  * That takes all of them out of the way in the end (Osherovich and Bruckstein 2008). */
-static uint32_t choose_flip(const struct cutter *c, uint32_t u, uint32_t v)
+static uint32_t choose_flip(const struct triangulation *c, uint32_t u, uint32_t v)
 {
 	struct point begin = flat_vertex(c, u), end = flat_vertex(c, v);
 	const uint32_t *h = c->crossed.data;
@@ -219,7 +219,7 @@ static uint32_t choose_flip(const struct cutter *c, uint32_t u, uint32_t v)
 	for (size_t i = 0; i < c->crossed.n; i++) {
 		double a = fabs(left_of(begin, end, flat_vertex(c, from(c, h[i]))));
 		double b = fabs(left_of(begin, end, flat_vertex(c, from(c, following(h[i])))));
-		if (fmax(a, b) > furthest && may_flip(c, h[i])) {
+		if (fmax(a, b) > furthest && mesh_may_flip(c, h[i])) {
 			furthest = fmax(a, b);
 			best = h[i];
 		}
@@ -228,7 +228,7 @@ static uint32_t choose_flip(const struct cutter *c, uint32_t u, uint32_t v)
 }
 
 /* Makes edges lead from vertex u to vertex v and marks them. */
-static int draw_line(struct cutter *c, uint32_t u, uint32_t v)
+static int draw_line(struct triangulation *c, uint32_t u, uint32_t v)
 {
 	for (int step = 0; u != v && step < STEPS_MAX; step++) {
 		uint32_t h = find_corner(c, u), blocked;
@@ -248,7 +248,7 @@ static int draw_line(struct cutter *c, uint32_t u, uint32_t v)
 			return 0; /* rounding leads out of the triangle, along its side */
 		h = blocked == RIM ? choose_flip(c, u, v) : RIM;
 		if (h != RIM)
-			flip_edge(c, h);
+			mesh_flip_edge(c, h);
 		else if (cross_edge(c, blocked != RIM ? blocked : w.crossed, u, v))
 			return -1;
 	}
@@ -257,44 +257,44 @@ static int draw_line(struct cutter *c, uint32_t u, uint32_t v)
 
 /* ---- all of it ---- */
 
-static int cut_triangle(struct cutter *c, const struct contact *contact, size_t n,
+static int cut_triangle(struct triangulation *c, const struct contact *contact, size_t n,
                         struct vec *ends)
 {
 	uint32_t vertex;
 
-	set_triangle(c, contact->triangle);
+	mesh_set_triangle(c, contact->triangle);
 	ends->n = 0;
 	for (size_t i = 0; i < 2 * n; i++)
 		if (put_point(c, contact[i / 2].end[i % 2], &vertex) ||
-		    vec_append(ends, &vertex, 1, sizeof vertex, c->e))
+		    mem_append(ends, &vertex, 1, sizeof vertex, c->e))
 			return -1;
-	flip_edges(c);
+	mesh_flip_edges(c);
 	const uint32_t *end = ends->data;
 	for (size_t i = 0; i < n; i++)
 		if (draw_line(c, end[2 * i], end[2 * i + 1]))
 			return -1;
-	flip_edges(c);
+	mesh_flip_edges(c);
 	return 0;
 }
 
 /* The triangles of m as pieces. */
-static int begin(struct cutter *c)
+static int begin(struct triangulation *c)
 {
 	const struct model *m = c->m;
-	int status = vec_append(&c->p->vertex, m->vertex, m->vertices, 3 * sizeof(double), c->e);
+	int status = mem_append(&c->p->vertex, m->vertex, m->vertices, 3 * sizeof(double), c->e);
 
-	for (size_t t = 0; !status && t < m->triangles; t++) {
+	for (size_t t = 0; !status && t < m->triangle.n; t++) {
 		struct piece p = { .across = { RIM, RIM, RIM }, .triangle = (uint32_t)t,
 			           .next = RIM };
-		memcpy(p.v, &m->triangle[3 * t], sizeof p.v);
+		memcpy(p.v, &m->triangle.corner[3 * t], sizeof p.v);
 		memcpy(p.rim, &c->g->of[3 * t], sizeof p.rim);
-		status = vec_append(&c->p->piece, &p, 1, sizeof p, c->e);
+		status = mem_append(&c->p->piece, &p, 1, sizeof p, c->e);
 	}
 	return status;
 }
 
 /* How many half-edges lie in the place of h. */
-static uint32_t halves_at(const struct cutter *c, uint32_t h)
+static uint32_t halves_at(const struct triangulation *c, uint32_t h)
 {
 	uint32_t edge = get_half(c, h).rim;
 
@@ -302,7 +302,7 @@ static uint32_t halves_at(const struct cutter *c, uint32_t h)
 }
 
 /* Halves lines of a single edge, whose ends are no place to part the surface at. */
-static int halve_short_lines(struct cutter *c)
+static int halve_short_lines(struct triangulation *c)
 {
 	size_t halves = 3 * c->p->piece.n, vertices = c->p->vertex.n;
 	uint32_t *at = mem_new(vertices, sizeof *at, "lines", c->e);
@@ -317,7 +317,7 @@ static int halve_short_lines(struct cutter *c)
 		uint32_t n = halves_at(c, h), a = from(c, h), b = from(c, following(h));
 		if (get_half(c, h).line && b < vertices && at[a] == n && at[b] == n) {
 			at[a] = at[b] = 0; /* so that the halves across h are passed over */
-			status = halve_middle(c, h);
+			status = mesh_halve_middle(c, h);
 		}
 	}
 	free(at);
@@ -327,18 +327,18 @@ static int halve_short_lines(struct cutter *c)
 /* Is the triangle so thin that its own corners are near its sides? */
 static int too_thin(const struct model *m, uint32_t triangle, double height)
 {
-	const uint32_t *v = &m->triangle[3 * (size_t)triangle];
+	const uint32_t *v = &m->triangle.corner[3 * (size_t)triangle];
 	double area[3];
 
 	v3_area(&m->vertex[3 * (size_t)v[0]], &m->vertex[3 * (size_t)v[1]],
 	        &m->vertex[3 * (size_t)v[2]], area);
-	return 2 * v3_length(area) <= height * longest_edge(m, triangle);
+	return 2 * v3_length(area) <= height * mesh_longest_edge(m, triangle);
 }
 
-int cut_triangles(const struct model *m, const struct edges *g, const struct contacts *contacts,
-                  const struct imprint_limits *limits, struct pieces *p, struct err *e)
+int mesh_constrain_edges(const struct model *m, const struct half_edges *g, const struct contacts *contacts,
+                         const struct imprint_limits *limits, struct pieces *p, struct err *e)
 {
-	struct cutter c = { .m = m, .g = g, .p = p, .apart = limits->apart, .e = e };
+	struct triangulation c = { .m = m, .g = g, .p = p, .apart = limits->apart, .e = e };
 	const struct contact *list = contacts->list.data;
 	struct vec ends = { 0 };
 	size_t n = contacts->list.n;
@@ -356,7 +356,7 @@ int cut_triangles(const struct model *m, const struct edges *g, const struct con
 		status = halve_short_lines(&c);
 	for (size_t i = 0; !status && i < n; i++)
 		if (i == 0 || list[i].triangle != list[i - 1].triangle)
-			status = refine_triangle(&c, list[i].triangle, limits->size);
+			status = mesh_delaunay_refine(&c, list[i].triangle, limits->size);
 	free(ends.data);
 	free(c.crossed.data);
 	return status ? -1 : 0;

@@ -12,7 +12,7 @@
 struct search {
 	const struct model *m;
 	const struct imprint_limits *limits;
-	const struct edges *g;
+	const struct half_edges *g;
 	double (*normal)[3];      /* [triangles] unit */
 	uint32_t *plane;          /* [triangles] sets of coplanar neighbours */
 	struct boxes boxes;
@@ -33,10 +33,10 @@ struct cut {
 
 static const double *corner(const struct model *m, size_t triangle, int k)
 {
-	return &m->vertex[3 * (size_t)m->triangle[3 * triangle + (size_t)k]];
+	return &m->vertex[3 * (size_t)m->triangle.corner[3 * triangle + (size_t)k]];
 }
 
-double longest_edge(const struct model *m, size_t triangle)
+double mesh_longest_edge(const struct model *m, size_t triangle)
 {
 	double longest = 0, d[3];
 
@@ -52,10 +52,10 @@ static int neighbours(const struct model *m, uint32_t a, uint32_t b)
 {
 	int shared = 0;
 
-	if (m->triangle_surface[a] != m->triangle_surface[b])
+	if (m->triangle.surface[a] != m->triangle.surface[b])
 		return 0;
 	for (size_t i = 0; i < 9; i++)
-		shared += m->triangle[3 * (size_t)a + i / 3] == m->triangle[3 * (size_t)b + i % 3];
+		shared += m->triangle.corner[3 * (size_t)a + i / 3] == m->triangle.corner[3 * (size_t)b + i % 3];
 	return shared > 1;
 }
 
@@ -134,7 +134,7 @@ static int clip(const struct search *s, uint32_t a, double end[2][3], int *rim)
 /* Does a triangle give light, on either side? */
 static int emits(const struct model *m, uint32_t triangle)
 {
-	uint32_t material = m->surface.material[m->triangle_surface[triangle]];
+	uint32_t material = m->surface.material[m->triangle.surface[triangle]];
 
 	return bsdf_emits(&m->material, material, FRONT) || bsdf_emits(&m->material, material, BACK);
 }
@@ -145,7 +145,7 @@ static int add_cut(struct search *s, uint32_t a, uint32_t b, const double p[3],
                    const double q[3], int flush, int fine)
 {
 	const double *given[2] = { p, q }, *n = s->normal[a];
-	struct cut c = { .plane = sets_find(s->plane, b), .flush = flush,
+	struct cut c = { .plane = geo_sets_find(s->plane, b), .flush = flush,
 	                 .shortest = fine || emits(s->m, b) ? s->limits->fine : s->limits->shortest };
 	double d[3];
 
@@ -153,7 +153,7 @@ static int add_cut(struct search *s, uint32_t a, uint32_t b, const double p[3],
 		v3_sub(given[i], corner(s->m, a, 0), d);
 		v3_mad(given[i], -v3_dot(n, d), n, c.end[i]);
 	}
-	return vec_append(&s->cut, &c, 1, sizeof c, s->e);
+	return mem_append(&s->cut, &c, 1, sizeof c, s->e);
 }
 
 /* Triangle b has corners on both sides of the plane of a, at `height` above it. */
@@ -296,13 +296,13 @@ static int add_contact(struct search *s, uint32_t a, const struct cut *cut)
 		s->out->fine++;
 		return 0;
 	}
-	return vec_append(&s->out->list, &c, 1, sizeof c, s->e);
+	return mem_append(&s->out->list, &c, 1, sizeof c, s->e);
 }
 
 static int search_triangle(struct search *s, uint32_t a)
 {
 	s->near.n = s->cut.n = 0;
-	if (boxes_find(&s->boxes, &s->boxes.box[a], s->limits->close, &s->near, s->e))
+	if (geo_boxes_find(&s->boxes, &s->boxes.box[a], s->limits->close, &s->near, s->e))
 		return -1;
 	const uint32_t *b = s->near.data;
 	for (size_t i = 0; i < s->near.n; i++)
@@ -320,33 +320,33 @@ static int prepare(struct search *s)
 {
 	const struct model *m = s->m;
 
-	s->normal = mem_new(m->triangles, sizeof *s->normal, "normals", s->e);
-	s->plane = sets_new(m->triangles, s->e);
+	s->normal = mem_new(m->triangle.n, sizeof *s->normal, "normals", s->e);
+	s->plane = geo_sets_new(m->triangle.n, s->e);
 	if (!s->normal || !s->plane ||
-	    boxes_build(&s->boxes, m->vertex, m->triangle, m->triangles, s->e))
+	    geo_boxes_build(&s->boxes, m->vertex, m->triangle.corner, m->triangle.n, s->e))
 		return -1;
-	for (size_t t = 0; t < m->triangles; t++) {
+	for (size_t t = 0; t < m->triangle.n; t++) {
 		v3_area(corner(m, t, 0), corner(m, t, 1), corner(m, t, 2), s->normal[t]);
 		v3_normalise(s->normal[t]);
 	}
-	for (uint32_t h = 0; h < 3 * m->triangles; h++)
-		sets_join(s->plane, h / 3, coplanar(s, h));
+	for (uint32_t h = 0; h < 3 * m->triangle.n; h++)
+		geo_sets_join(s->plane, h / 3, coplanar(s, h));
 	return 0;
 }
 
-int find_contacts(const struct model *m, const struct edges *g,
-                  const struct imprint_limits *limits, struct contacts *out, struct err *e)
+int mesh_find_contacts(const struct model *m, const struct half_edges *g,
+                       const struct imprint_limits *limits, struct contacts *out, struct err *e)
 {
 	struct search s = { .m = m, .limits = limits, .g = g, .out = out, .e = e };
 	int status = prepare(&s);
 
-	for (uint32_t t = 0; !status && t < m->triangles; t++)
-		if (longest_edge(m, t) > limits->size)
+	for (uint32_t t = 0; !status && t < m->triangle.n; t++)
+		if (mesh_longest_edge(m, t) > limits->size)
 			status = search_triangle(&s, t);
 	free(s.normal);
 	free(s.plane);
 	free(s.near.data);
 	free(s.cut.data);
-	boxes_free(&s.boxes);
+	geo_boxes_free(&s.boxes);
 	return status;
 }

@@ -22,7 +22,7 @@ struct search {
 
 static const double *corner(const struct model *m, size_t triangle, int k)
 {
-	return &m->vertex[3 * (size_t)m->triangle[3 * triangle + (size_t)k]];
+	return &m->vertex[3 * (size_t)m->triangle.corner[3 * triangle + (size_t)k]];
 }
 
 static void normal_of(const struct model *m, size_t triangle, double n[3])
@@ -35,7 +35,7 @@ static int transmits(const struct materials *mt, size_t material)
 {
 	for (int side = 0; side < 2; side++)
 		for (int b = 0; b < mt->bands; b++) {
-			size_t at = material_at(mt, material, side) + (size_t)b;
+			size_t at = model_material_at(mt, material, side) + (size_t)b;
 			if (mt->tau_d[at] > 0 || mt->tau_s[at] > 0)
 				return 1;
 		}
@@ -86,7 +86,7 @@ static uint32_t holder(const struct search *s, uint32_t t, uint32_t surface, con
 	const uint32_t *near = s->near.data;
 
 	for (size_t i = 0; i < s->near.n; i++)
-		if (s->m->triangle_surface[near[i]] == surface && holds(s, near[i], x) &&
+		if (s->m->triangle.surface[near[i]] == surface && holds(s, near[i], x) &&
 		    in_plane(s, t, near[i]))
 			return near[i];
 	return t;
@@ -98,7 +98,7 @@ static int thin(const struct search *s, uint32_t t)
 	double n[3];
 
 	v3_area(corner(s->m, t, 0), corner(s->m, t, 1), corner(s->m, t, 2), n);
-	return 2 * v3_length(n) < 4 * s->limits->apart * longest_edge(s->m, t);
+	return 2 * v3_length(n) < 4 * s->limits->apart * mesh_longest_edge(s->m, t);
 }
 
 /* The triangle at the centre of t of a surface that covers it whole, or none (t itself):
@@ -121,17 +121,17 @@ static uint32_t cover(const struct search *s, uint32_t t, uint32_t surface)
 /* What lies on t and covers it; t itself if nothing does. */
 static int find_cover(struct search *s, uint32_t t, uint32_t *found, struct err *e)
 {
-	uint32_t own = s->m->triangle_surface[t], last = own;
+	uint32_t own = s->m->triangle.surface[t], last = own;
 
 	*found = t;
 	s->near.n = 0;
 	if (thin(s, t))
 		return 0;
-	if (boxes_find(&s->boxes, &s->boxes.box[t], s->limits->thick, &s->near, e))
+	if (geo_boxes_find(&s->boxes, &s->boxes.box[t], s->limits->thick, &s->near, e))
 		return -1;
 	const uint32_t *near = s->near.data;
 	for (size_t i = 0; i < s->near.n && *found == t; i++) {
-		uint32_t surface = s->m->triangle_surface[near[i]];
+		uint32_t surface = s->m->triangle.surface[near[i]];
 		if (surface == last || !on_top(s, surface, own) || !in_plane(s, t, near[i]))
 			continue;
 		*found = cover(s, t, surface);
@@ -145,43 +145,43 @@ static int prepare(struct search *s, struct err *e)
 	const struct model *m = s->m;
 
 	s->area = mem_new(m->surface.n, sizeof *s->area, "surfaces", e);
-	if (!s->area || boxes_build(&s->boxes, m->vertex, m->triangle, m->triangles, e))
+	if (!s->area || geo_boxes_build(&s->boxes, m->vertex, m->triangle.corner, m->triangle.n, e))
 		return -1;
-	for (size_t t = 0; t < m->triangles; t++) {
+	for (size_t t = 0; t < m->triangle.n; t++) {
 		double n[3];
 		v3_area(corner(m, t, 0), corner(m, t, 1), corner(m, t, 2), n);
-		s->area[m->triangle_surface[t]] += v3_length(n);
+		s->area[m->triangle.surface[t]] += v3_length(n);
 	}
 	return 0;
 }
 
-int drop_covered(struct model *m, const struct imprint_limits *limits,
-                 struct mesher_report *r, struct err *e)
+int mesh_drop_covered(struct model *m, const struct imprint_limits *limits,
+                      struct mesh_report *r, struct err *e)
 {
 	struct search s = { .m = m, .limits = limits };
-	uint8_t *keep = mem_new(m->triangles, 1, "covered triangles", e);
-	uint64_t *twin = mem_new(m->triangles, sizeof *twin, "covered triangles", e);
+	uint8_t *keep = mem_new(m->triangle.n, 1, "covered triangles", e);
+	uint64_t *twin = mem_new(m->triangle.n, sizeof *twin, "covered triangles", e);
 	uint32_t *group = NULL, found, merged = r->merged;
 	int status = keep && twin ? prepare(&s, e) : -1;
 
-	for (uint32_t t = 0; !status && t < m->triangles; t++) {
+	for (uint32_t t = 0; !status && t < m->triangle.n; t++) {
 		if ((status = find_cover(&s, t, &found, e)) != 0)
 			break;
 		keep[t] = found == t;
 		r->covered += !keep[t];
 		if (!keep[t])
-			note_twin(m, t, found, twin);
+			mesh_note_twin(m, t, found, twin);
 	}
 	if (!status && r->covered) {
-		status = merge_sandwiches(m, twin, keep, r, e);
+		status = mesh_merge_coincident_sheets(m, twin, keep, r, e);
 		if (!status)
-			clean_compact(m, keep);
+			mesh_clean_compact(m, keep);
 		if (!status && r->merged > merged)
-			status = clean_separate(m, &group, e);
+			status = mesh_clean_separate(m, &group, e);
 	}
 	free(s.area);
 	free(s.near.data);
-	boxes_free(&s.boxes);
+	geo_boxes_free(&s.boxes);
 	free(keep);
 	free(twin);
 	free(group);

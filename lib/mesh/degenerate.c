@@ -35,36 +35,36 @@ static void move_row(void *array, size_t row, size_t to, size_t t)
 		memcpy((char *)array + to * row, (char *)array + t * row, row);
 }
 
-void clean_compact(struct model *m, const uint8_t *keep)
+void mesh_clean_compact(struct model *m, const uint8_t *keep)
 {
 	size_t n = 0;
 
-	for (size_t t = 0; t < m->triangles; t++) {
+	for (size_t t = 0; t < m->triangle.n; t++) {
 		if (!keep[t])
 			continue;
-		move_row(m->triangle, 3 * sizeof *m->triangle, n, t);
-		move_row(m->triangle_surface, sizeof *m->triangle_surface, n, t);
-		move_row(m->triangle_uv, 6 * sizeof *m->triangle_uv, n, t);
-		move_row(m->triangle_normal, 9 * sizeof *m->triangle_normal, n, t);
+		move_row(m->triangle.corner, 3 * sizeof *m->triangle.corner, n, t);
+		move_row(m->triangle.surface, sizeof *m->triangle.surface, n, t);
+		move_row(m->triangle.uv, 6 * sizeof *m->triangle.uv, n, t);
+		move_row(m->triangle.normal, 9 * sizeof *m->triangle.normal, n, t);
 		n++;
 	}
-	m->triangles = n;
+	m->triangle.n = n;
 }
 
-static int drop_degenerate(struct model *m, struct mesher_report *r, struct err *e)
+static int drop_degenerate(struct model *m, struct mesh_report *r, struct err *e)
 {
-	uint8_t *keep = mem_new(m->triangles, 1, "triangles", e);
+	uint8_t *keep = mem_new(m->triangle.n, 1, "triangles", e);
 
 	if (!keep)
 		return -1;
-	for (size_t t = 0; t < m->triangles; t++) {
-		keep[t] = !degenerate(m, &m->triangle[3 * t]);
+	for (size_t t = 0; t < m->triangle.n; t++) {
+		keep[t] = !degenerate(m, &m->triangle.corner[3 * t]);
 		if (keep[t])
 			continue;
-		r->surface[m->triangle_surface[t]].degenerate++;
+		r->surface[m->triangle.surface[t]].degenerate++;
 		r->total.degenerate++;
 	}
-	clean_compact(m, keep);
+	mesh_clean_compact(m, keep);
 	free(keep);
 	return 0;
 }
@@ -76,17 +76,17 @@ static int compare_keys(const void *pa, const void *pb)
 	return a < b ? -1 : a > b;
 }
 
-int clean_separate(struct model *m, uint32_t **group, struct err *e)
+int mesh_clean_separate(struct model *m, uint32_t **group, struct err *e)
 {
 	int status = -1;
-	size_t corners = 3 * m->triangles, n = 0;
+	size_t corners = 3 * m->triangle.n, n = 0;
 	uint64_t *key = mem_new(corners, sizeof *key, "vertices", e);
 	double *vertex = NULL;
 
 	if (!key)
 		return -1;
 	for (size_t i = 0; i < corners; i++)
-		key[i] = (uint64_t)m->triangle[i] << 32 | m->triangle_surface[i / 3];
+		key[i] = (uint64_t)m->triangle.corner[i] << 32 | m->triangle.surface[i / 3];
 	qsort(key, corners, sizeof *key, compare_keys);
 	for (size_t i = 0; i < corners; i++)
 		if (i == 0 || key[i] != key[i - 1])
@@ -100,9 +100,9 @@ int clean_separate(struct model *m, uint32_t **group, struct err *e)
 		(*group)[i] = (uint32_t)key[i];
 	}
 	for (size_t i = 0; i < corners; i++) {
-		uint64_t want = (uint64_t)m->triangle[i] << 32 | m->triangle_surface[i / 3];
+		uint64_t want = (uint64_t)m->triangle.corner[i] << 32 | m->triangle.surface[i / 3];
 		uint64_t *at = bsearch(&want, key, n, sizeof *key, compare_keys);
-		m->triangle[i] = (uint32_t)(at - key);
+		m->triangle.corner[i] = (uint32_t)(at - key);
 	}
 	free(m->vertex);
 	m->vertex = vertex;
@@ -134,14 +134,14 @@ static double *surface_tolerances(const struct model *m, const uint32_t *group,
 	/* The boxes are read before their place is written: s <= 6 s. */
 	for (size_t s = 0; s < m->surface.n; s++)
 		box[s] = box[6 * s] <= box[6 * s + 3]
-		             ? weld_tolerance(&box[6 * s], &box[6 * s + 3])
+		             ? geo_weld_tolerance(&box[6 * s], &box[6 * s + 3])
 		             : 0;
 	return box;
 }
 
 /* Vertex id[v] takes the place of v; the first member's position stays. */
 static void merge_vertices(struct model *m, const uint32_t *group, const uint32_t *id,
-                           size_t count, struct mesher_report *r)
+                           size_t count, struct mesh_report *r)
 {
 	size_t seen = 0;
 
@@ -155,26 +155,26 @@ static void merge_vertices(struct model *m, const uint32_t *group, const uint32_
 		}
 	}
 	m->vertices = count;
-	for (size_t i = 0; i < 3 * m->triangles; i++)
-		m->triangle[i] = id[m->triangle[i]];
+	for (size_t i = 0; i < 3 * m->triangle.n; i++)
+		m->triangle.corner[i] = id[m->triangle.corner[i]];
 }
 
-int clean_model(struct model *m, struct mesher_report *r, struct err *e)
+int mesh_clean_degenerate(struct model *m, struct mesh_report *r, struct err *e)
 {
 	int status = -1;
 	uint32_t *group = NULL, *id = NULL;
 	double *tolerance = NULL;
 	size_t count;
 
-	if (drop_degenerate(m, r, e) || clean_separate(m, &group, e))
+	if (drop_degenerate(m, r, e) || mesh_clean_separate(m, &group, e))
 		goto done;
 	tolerance = surface_tolerances(m, group, e);
 	id = mem_new(m->vertices, sizeof *id, "vertices", e);
 	if (!tolerance || !id)
 		goto done;
 	struct weld w = { m->vertices, m->vertex, group, m->surface.n, tolerance,
-		          m->triangles, m->triangle };
-	if (weld_points(&w, id, &count, e))
+		          m->triangle.n, m->triangle.corner };
+	if (geo_weld_points(&w, id, &count, e))
 		goto done;
 	merge_vertices(m, group, id, count, r);
 	status = 0;
@@ -185,7 +185,7 @@ done:
 	return status;
 }
 
-uint32_t *clean_positions(const struct model *m, size_t *places, struct err *e)
+uint32_t *mesh_clean_positions(const struct model *m, size_t *places, struct err *e)
 {
 	uint32_t *group = mem_new(m->vertices, sizeof *group, "positions", e);
 	uint32_t *position = mem_new(m->vertices, sizeof *position, "positions", e);
@@ -193,10 +193,10 @@ uint32_t *clean_positions(const struct model *m, size_t *places, struct err *e)
 
 	model_box(m, lo, hi);
 	v3_sub(hi, lo, d);
-	tolerance = fmax(0x1p-22 * v3_length(d), weld_tolerance(lo, hi));
-	struct weld w = { m->vertices, m->vertex, group, 1, &tolerance, m->triangles,
-		          m->triangle };
-	if (!group || !position || weld_points(&w, position, places, e)) {
+	tolerance = fmax(0x1p-22 * v3_length(d), geo_weld_tolerance(lo, hi));
+	struct weld w = { m->vertices, m->vertex, group, 1, &tolerance, m->triangle.n,
+		          m->triangle.corner };
+	if (!group || !position || geo_weld_points(&w, position, places, e)) {
 		free(position);
 		position = NULL;
 	}

@@ -18,13 +18,13 @@ enum {
 	               refinement goes on to the least size all around */
 };
 
-static double length(const struct cutter *c, uint32_t h)
+static double length(const struct triangulation *c, uint32_t h)
 {
 	return distance(flat_vertex(c, from(c, h)), flat_vertex(c, from(c, following(h))));
 }
 
 /* Is piece i too slender, and worth changing? */
-static int is_slender(const struct cutter *c, uint32_t i, double size)
+static int is_slender(const struct triangulation *c, uint32_t i, double size)
 {
 	double edge[3], least, longest;
 
@@ -38,7 +38,7 @@ static int is_slender(const struct cutter *c, uint32_t i, double size)
 	return longest > size && area < LEAST_SINE * middle * longest;
 }
 
-static struct point circumcentre(const struct cutter *c, uint32_t i)
+static struct point circumcentre(const struct triangulation *c, uint32_t i)
 {
 	struct point o = flat_vertex(c, from(c, 3 * i));
 	struct point p = flat_vertex(c, from(c, 3 * i + 1));
@@ -52,7 +52,7 @@ static struct point circumcentre(const struct cutter *c, uint32_t i)
 }
 
 /* A line, or a side of the triangle that is being cut. */
-static int is_border(const struct cutter *c, uint32_t h)
+static int is_border(const struct triangulation *c, uint32_t h)
 {
 	struct half s = get_half(c, h);
 
@@ -60,7 +60,7 @@ static int is_border(const struct cutter *c, uint32_t h)
 }
 
 /* Goes from piece i towards x. The border in the way, or RIM: then *i holds x. */
-static uint32_t walk(const struct cutter *c, uint32_t *i, struct point x)
+static uint32_t walk(const struct triangulation *c, uint32_t *i, struct point x)
 {
 	for (int step = 0; step < STEPS_MAX; step++) {
 		uint32_t beyond = RIM;
@@ -81,7 +81,7 @@ static uint32_t walk(const struct cutter *c, uint32_t *i, struct point x)
 }
 
 /* The border of piece i in whose diametral circle x lies, or RIM. */
-static uint32_t encroached(const struct cutter *c, uint32_t i, struct point x)
+static uint32_t encroached(const struct triangulation *c, uint32_t i, struct point x)
 {
 	for (uint32_t h = 3 * i; h < 3 * i + 3; h++) {
 		struct point a = flat_vertex(c, from(c, h)), b = flat_vertex(c, from(c, following(h)));
@@ -92,7 +92,7 @@ static uint32_t encroached(const struct cutter *c, uint32_t i, struct point x)
 }
 
 /* Is x far enough from the sides of piece i? */
-static int has_room(const struct cutter *c, uint32_t i, struct point x)
+static int has_room(const struct triangulation *c, uint32_t i, struct point x)
 {
 	for (uint32_t h = 3 * i; h < 3 * i + 3; h++)
 		if (!(left_of(flat_vertex(c, from(c, h)), flat_vertex(c, from(c, following(h))), x) >
@@ -103,7 +103,7 @@ static int has_room(const struct cutter *c, uint32_t i, struct point x)
 
 /* Improves the place of slender piece i: 1 if something was done, 0 if nothing can be, or
  * -1 and c->e. */
-static int refine_piece(struct cutter *c, uint32_t i, double size)
+static int refine_piece(struct triangulation *c, uint32_t i, double size)
 {
 	struct point x = circumcentre(c, i);
 	uint32_t border = walk(c, &i, x), vertex;
@@ -112,20 +112,20 @@ static int refine_piece(struct cutter *c, uint32_t i, double size)
 	if (border == RIM)
 		border = encroached(c, i, x);
 	if (border != RIM)
-		return length(c, border) <= size ? 0 : halve_middle(c, border) ? -1 : 1;
+		return length(c, border) <= size ? 0 : mesh_halve_middle(c, border) ? -1 : 1;
 	if (!has_room(c, i, x))
 		return 0;
 	v3_mad(c->origin, x.x, c->axis[0], at);
 	v3_mad(at, x.y, c->axis[1], at);
-	return add_vertex(c, at, &vertex) || halve_face(c, i, vertex) ? -1 : 1;
+	return mesh_add_vertex(c, at, &vertex) || mesh_halve_face(c, i, vertex) ? -1 : 1;
 }
 
-int refine_triangle(struct cutter *c, uint32_t triangle, double size)
+int mesh_delaunay_refine(struct triangulation *c, uint32_t triangle, double size)
 {
 	int changed = 1;
 
-	size = fmax(size, longest_edge(c->m, triangle) / FINEST);
-	set_triangle(c, triangle);
+	size = fmax(size, mesh_longest_edge(c->m, triangle) / FINEST);
+	mesh_set_triangle(c, triangle);
 	for (int round = 0; changed && round < ROUNDS_MAX; round++) {
 		changed = 0;
 		for (uint32_t i = triangle; i != RIM; i = piece_of(c, 3 * i)->next) {
@@ -134,7 +134,7 @@ int refine_triangle(struct cutter *c, uint32_t triangle, double size)
 				return -1;
 			changed |= did;
 		}
-		flip_edges(c);
+		mesh_flip_edges(c);
 	}
 	return 0;
 }

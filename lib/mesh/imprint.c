@@ -24,29 +24,29 @@ static struct imprint_limits limits_of(const struct model *m, double size)
 		                        .shortest = size / 2, .fine = size / 16 };
 }
 
-int imprint(struct model *m, double size, struct mesher_report *r, struct err *e)
+int mesh_imprint(struct model *m, double size, struct mesh_report *r, struct err *e)
 {
 	struct imprint_limits limits = limits_of(m, size);
-	struct edges g = { 0 };
+	struct half_edges g = { 0 };
 	struct contacts contacts = { 0 };
 	struct pieces pieces = { 0 };
 	int status = -1;
 
 	if (!isfinite(size))
 		return 0;
-	if (edges_build(&g, m->triangle, m->triangles, m->vertices, e) ||
-	    find_contacts(m, &g, &limits, &contacts, e))
+	if (geo_half_edges_build(&g, m->triangle.corner, m->triangle.n, m->vertices, e) ||
+	    mesh_find_contacts(m, &g, &limits, &contacts, e))
 		goto done;
 	status = 0;
 	if (contacts.list.n)
-		status = cut_triangles(m, &g, &contacts, &limits, &pieces, e) ||
-		         tear_lines(m, &pieces, &r->lines, e) ? -1 : 0;
+		status = mesh_constrain_edges(m, &g, &contacts, &limits, &pieces, e) ||
+		         mesh_imprint_replace(m, &pieces, &r->lines, e) ? -1 : 0;
 	r->cut = pieces.cut;
 	r->fine_contacts = contacts.fine;
 	if (!status)
-		status = drop_covered(m, &limits, r, e);
+		status = mesh_drop_covered(m, &limits, r, e);
 done:
-	edges_free(&g);
+	geo_half_edges_free(&g);
 	free(contacts.list.data);
 	free(pieces.vertex.data);
 	free(pieces.piece.data);

@@ -1,6 +1,6 @@
 /* Imprints: triangles are cut along the lines where others cross them or stand on them,
  * so that no element has one part in front of a wall and one behind it. The parts of
- * imprint() in stages.h, in the order in which it calls them. */
+ * mesh_imprint() in stages.h, in the order in which it calls them. */
 #ifndef TWOPASS_IMPRINT_H
 #define TWOPASS_IMPRINT_H
 
@@ -30,12 +30,12 @@ struct contacts {
 	size_t fine;      /* left out for being too short */
 };
 
-double longest_edge(const struct model *m, size_t triangle);
+double mesh_longest_edge(const struct model *m, size_t triangle);
 
 /* contacts.c: appends the contacts of all triangles longer than the elements, each found
  * once or more. g: edges of m->triangle. O(n log n + candidates). 0, or -1 and e. */
-int find_contacts(const struct model *m, const struct edges *g,
-                  const struct imprint_limits *limits, struct contacts *out, struct err *e);
+int mesh_find_contacts(const struct model *m, const struct half_edges *g,
+                       const struct imprint_limits *limits, struct contacts *out, struct err *e);
 
 /* A part of an input triangle. Half-edge 3 piece + k leads from v[k] to v[k+1]. */
 struct piece {
@@ -59,17 +59,17 @@ struct pieces {
  * towards Delaunay's criterion and refined elsewhere. No vertex ever lies inside an edge of
  * its surface. O(contacts x pieces of a triangle) at worst. p zeroed, to be freed in any
  * case. 0, or -1 and e. */
-int cut_triangles(const struct model *m, const struct edges *g, const struct contacts *c,
-                  const struct imprint_limits *limits, struct pieces *p, struct err *e);
+int mesh_constrain_edges(const struct model *m, const struct half_edges *g, const struct contacts *c,
+                         const struct imprint_limits *limits, struct pieces *p, struct err *e);
 
 /* imprint_replace.c: pieces become the triangles of m, their vertices its vertices. These are doubled
  * along lines, so that nothing that follows shared edges or vertices crosses them.
  * *lines = edges of pieces along lines. 0, or -1 and e. O(n log n). */
-int tear_lines(struct model *m, struct pieces *p, size_t *lines, struct err *e);
+int mesh_imprint_replace(struct model *m, struct pieces *p, size_t *lines, struct err *e);
 
 /* coplanar.c: drops triangles that an opaque, smaller surface covers in their plane, and counts
  * them in the report. O(n log n + candidates). 0, or -1 and e. */
-int drop_covered(struct model *m, const struct imprint_limits *limits,
-                 struct mesher_report *r, struct err *e);
+int mesh_drop_covered(struct model *m, const struct imprint_limits *limits,
+                      struct mesh_report *r, struct err *e);
 
 #endif

@@ -23,7 +23,7 @@ static int list_parts(const struct model *m, const struct pieces *p, struct part
 	out->triangle = mem_new(p->piece.n, 3 * sizeof *out->triangle, "triangles", e);
 	if (!out->piece || !out->triangle)
 		return -1;
-	for (uint32_t t = 0; t < m->triangles; t++)
+	for (uint32_t t = 0; t < m->triangle.n; t++)
 		for (uint32_t i = t; i != RIM; i = piece[i].next) {
 			memcpy(&out->triangle[3 * out->n], piece[i].v, sizeof piece[i].v);
 			out->piece[out->n++] = i;
@@ -33,7 +33,7 @@ static int list_parts(const struct model *m, const struct pieces *p, struct part
 
 /* Joins the corners, at both ends of each edge without a line, of the triangles that
  * share it, and marks the vertices of lines. */
-static size_t join_corners(const struct parts *parts, const struct edges *g,
+static size_t join_corners(const struct parts *parts, const struct half_edges *g,
                            const struct piece *piece, uint32_t *set, uint8_t *on_line)
 {
 	size_t lines = 0;
@@ -41,18 +41,18 @@ static size_t join_corners(const struct parts *parts, const struct edges *g,
 	for (size_t i = 0; i < g->n; i++) {
 		const uint32_t *use = &g->use[g->start[i]];
 		size_t n = g->start[i + 1] - g->start[i];
-		uint32_t lo = half_from(parts->triangle, use[0]);
+		uint32_t lo = geo_half_edge_from(parts->triangle, use[0]);
 		if (piece[parts->piece[use[0] / 3]].line[use[0] % 3]) {
-			on_line[lo] = on_line[half_to(parts->triangle, use[0])] = 1;
+			on_line[lo] = on_line[geo_half_edge_to(parts->triangle, use[0])] = 1;
 			lines++;
 			continue;
 		}
 		for (size_t k = 1; k < n; k++) {
 			uint32_t a[2] = { use[0], use[0] % 3 == 2 ? use[0] - 2 : use[0] + 1 };
 			uint32_t b[2] = { use[k], use[k] % 3 == 2 ? use[k] - 2 : use[k] + 1 };
-			int turned = half_from(parts->triangle, use[k]) != lo;
-			sets_join(set, a[0], b[turned]);
-			sets_join(set, a[1], b[!turned]);
+			int turned = geo_half_edge_from(parts->triangle, use[k]) != lo;
+			geo_sets_join(set, a[0], b[turned]);
+			geo_sets_join(set, a[1], b[!turned]);
 		}
 	}
 	return lines;
@@ -69,7 +69,7 @@ static int copy_vertices(struct parts *parts, struct vec *vertex, uint32_t *set,
 	if (!of_set || !taken)
 		goto done;
 	for (uint32_t i = 0; i < 3 * parts->n; i++) {
-		uint32_t v = parts->triangle[i], root = sets_find(set, i);
+		uint32_t v = parts->triangle[i], root = geo_sets_find(set, i);
 		if (!on_line[v])
 			continue;
 		if (root == i) {
@@ -78,7 +78,7 @@ static int copy_vertices(struct parts *parts, struct vec *vertex, uint32_t *set,
 				double at[3];
 				memcpy(at, (double *)vertex->data + 3 * (size_t)v, sizeof at);
 				of_set[i] = (uint32_t)vertex->n;
-				if (vec_append(vertex, at, 1, sizeof at, e))
+				if (mem_append(vertex, at, 1, sizeof at, e))
 					goto done;
 			}
 			taken[v] = 1;
@@ -99,7 +99,7 @@ static void weights(const struct model *m, size_t triangle, const double x[3], d
 	double n[3], a[3];
 
 	for (size_t k = 0; k < 3; k++)
-		corner[k] = &m->vertex[3 * (size_t)m->triangle[3 * triangle + k]];
+		corner[k] = &m->vertex[3 * (size_t)m->triangle.corner[3 * triangle + k]];
 	v3_area(corner[0], corner[1], corner[2], n);
 	for (int k = 0; k < 3; k++) {
 		v3_area(x, corner[(k + 1) % 3], corner[(k + 2) % 3], a);
@@ -122,11 +122,11 @@ static int replace(struct model *m, const struct pieces *p, struct parts *parts,
 {
 	const struct piece *piece = p->piece.data;
 	uint32_t *surface = mem_new(parts->n, sizeof *surface, "triangles", e);
-	float *uv = m->triangle_uv ? mem_new(parts->n, 6 * sizeof *uv, "UVs", e) : NULL;
-	float *normal = m->triangle_normal ? mem_new(parts->n, 9 * sizeof *normal, "normals", e)
+	float *uv = m->triangle.uv ? mem_new(parts->n, 6 * sizeof *uv, "UVs", e) : NULL;
+	float *normal = m->triangle.normal ? mem_new(parts->n, 9 * sizeof *normal, "normals", e)
 	                                   : NULL;
 
-	if (!surface || (m->triangle_uv && !uv) || (m->triangle_normal && !normal)) {
+	if (!surface || (m->triangle.uv && !uv) || (m->triangle.normal && !normal)) {
 		free(surface);
 		free(uv);
 		free(normal);
@@ -138,36 +138,36 @@ static int replace(struct model *m, const struct pieces *p, struct parts *parts,
 		double w[3][3];
 		for (int k = 0; k < 3; k++)
 			weights(m, t, (const double *)p->vertex.data + 3 * (size_t)part->v[k], w[k]);
-		surface[i] = m->triangle_surface[t];
+		surface[i] = m->triangle.surface[t];
 		if (uv)
-			interpolate(&m->triangle_uv[6 * t], 2, w, &uv[6 * i]);
+			interpolate(&m->triangle.uv[6 * t], 2, w, &uv[6 * i]);
 		if (normal)
-			interpolate(&m->triangle_normal[9 * t], 3, w, &normal[9 * i]);
+			interpolate(&m->triangle.normal[9 * t], 3, w, &normal[9 * i]);
 	}
-	free(m->triangle);
-	free(m->triangle_surface);
-	free(m->triangle_uv);
-	free(m->triangle_normal);
-	m->triangle = parts->triangle;
-	m->triangle_surface = surface;
-	m->triangle_uv = uv;
-	m->triangle_normal = normal;
-	m->triangles = parts->n;
+	free(m->triangle.corner);
+	free(m->triangle.surface);
+	free(m->triangle.uv);
+	free(m->triangle.normal);
+	m->triangle.corner = parts->triangle;
+	m->triangle.surface = surface;
+	m->triangle.uv = uv;
+	m->triangle.normal = normal;
+	m->triangle.n = parts->n;
 	parts->triangle = NULL;
 	return 0;
 }
 
-int tear_lines(struct model *m, struct pieces *p, size_t *lines, struct err *e)
+int mesh_imprint_replace(struct model *m, struct pieces *p, size_t *lines, struct err *e)
 {
 	int status = -1;
 	size_t vertices = p->vertex.n;
 	struct parts parts = { 0 };
-	struct edges g = { 0 };
-	uint32_t *set = sets_new(3 * p->piece.n, e);
+	struct half_edges g = { 0 };
+	uint32_t *set = geo_sets_new(3 * p->piece.n, e);
 	uint8_t *on_line = mem_new(vertices, 1, "vertices", e);
 
 	if (!set || !on_line || list_parts(m, p, &parts, e) ||
-	    edges_build(&g, parts.triangle, parts.n, vertices, e))
+	    geo_half_edges_build(&g, parts.triangle, parts.n, vertices, e))
 		goto done;
 	*lines = join_corners(&parts, &g, p->piece.data, set, on_line);
 	if (copy_vertices(&parts, &p->vertex, set, on_line, vertices, e) ||
@@ -183,6 +183,6 @@ done:
 	free(parts.triangle);
 	free(set);
 	free(on_line);
-	edges_free(&g);
+	geo_half_edges_free(&g);
 	return status;
 }

@@ -13,14 +13,14 @@
 
 /* A length in metres or, if relative, as a fraction of the diagonal of the
  * scene's bounding box; INFINITY = no bound. */
-struct mesher_size {
+struct mesh_size {
 	double value;
 	int relative;
 };
 
-struct mesher_options {
-	struct mesher_size patch;    /* longest side of a patch */
-	struct mesher_size element;  /* longest edge of an element */
+struct mesh_options {
+	struct mesh_size patch;    /* longest side of a patch */
+	struct mesh_size element;  /* longest edge of an element */
 	int element_within_patch;    /* 1: no longer than the patch size either */
 	double normal_cone;          /* degrees: how far the elements of a grouped
 	                                patch may turn away from its mean normal */
@@ -30,25 +30,25 @@ struct mesher_options {
 
 /* Refinement goes on until the expected error is small enough, or the elements are so many
  * or so small; in one step to a quarter of an element's edge at most. */
-struct mesher_refinement {
+struct mesh_refinement {
 	double error;                /* root mean square over all modelled sides of the error of
 	                                exitance, over the mean exitance */
-	struct mesher_size smallest; /* elements are not divided to shorter longest edges */
+	struct mesh_size smallest; /* elements are not divided to shorter longest edges */
 	size_t elements;
 };
 
 /* What cleaning did to one surface. */
-struct mesher_surface {
+struct mesh_surface {
 	uint32_t degenerate;  /* triangles without area, dropped */
 	uint32_t duplicate;   /* triangles that coincide with a kept one, dropped */
 	uint32_t welded;      /* vertices that became one with another */
 	uint32_t opposite;    /* edges whose two triangles have opposite winding */
 };
 
-struct mesher_report {
+struct mesh_report {
 	size_t surfaces;                 /* of the model that came in */
-	struct mesher_surface *surface;
-	struct mesher_surface total;
+	struct mesh_surface *surface;
+	struct mesh_surface total;
 	uint32_t merged;                 /* kept triangles whose black back became the
 	                                    side of the duplicate that faced that way */
 
@@ -63,7 +63,7 @@ struct mesher_report {
 	uint32_t largest_patch;          /* elements in it */
 	double area_front, area_back;    /* of the modelled sides, m^2 */
 
-	/* Of mesher_refine. Errors as in struct mesher_refinement. */
+	/* Of mesh_refine. Errors as in struct mesh_refinement. */
 	size_t elements_before, patches_before;
 	size_t marked, patches_marked;   /* to be divided for their own sake */
 	size_t patches_for_lobes;        /* of these, for what lobes light */
@@ -82,8 +82,8 @@ struct mesher_report {
 };
 
 /* 0, or -1 and e (m then is to be freed as it is). r must be zeroed. */
-int mesher_run(struct model *m, const struct mesher_options *o, struct mesher_report *r,
-               struct err *e);
+int mesh_run(struct model *m, const struct mesh_options *o, struct mesh_report *r,
+             struct err *e);
 
 /* The same from an earlier mesh and its solution: `old` becomes the division of m, with
  * those elements halved that contribute most to the error that s states (s->discretisation),
@@ -92,10 +92,10 @@ int mesher_run(struct model *m, const struct mesher_options *o, struct mesher_re
  * materials and cameras than old, but its triangles, cleaned and cut as o says, must be the
  * same. (*origin)[e] = element of old that element e is part of, to be freed in any case. old
  * is used up. */
-int mesher_refine(struct model *m, const struct mesher_options *o, struct model *old,
-                  const struct solution *s, const struct mesher_refinement *how,
-                  uint32_t **origin, struct mesher_report *r, struct err *e);
+int mesh_refine(struct model *m, const struct mesh_options *o, struct model *old,
+                const struct solution *s, const struct mesh_refinement *how,
+                uint32_t **origin, struct mesh_report *r, struct err *e);
 
-void mesher_report_free(struct mesher_report *r);
+void mesh_report_free(struct mesh_report *r);
 
 #endif

@@ -14,12 +14,12 @@ struct place {
 	uint32_t old;       /* old number of the patch or element */
 };
 
-static struct curve scene_curve(const struct model *m)
+static struct morton_curve scene_curve(const struct model *m)
 {
 	double lo[3], hi[3];
 
 	model_box(m, lo, hi);
-	return curve_of(lo, hi);
+	return geo_morton_curve(lo, hi);
 }
 
 static int compare_places(const void *pa, const void *pb)
@@ -34,10 +34,10 @@ static int compare_places(const void *pa, const void *pb)
 }
 
 /* Centroid of an element relative to the centre; returns its area. */
-static double centroid(const struct model *m, const struct curve *c, size_t element,
+static double centroid(const struct model *m, const struct morton_curve *c, size_t element,
                        double x[3])
 {
-	const uint32_t *v = &m->element[3 * element];
+	const uint32_t *v = &m->element.corner[3 * element];
 	double a[3];
 
 	x[0] = x[1] = x[2] = 0;
@@ -51,13 +51,13 @@ static double centroid(const struct model *m, const struct curve *c, size_t elem
 }
 
 /* rank[old patch] = new patch, by the code of its centroid. */
-static int rank_patches(const struct model *m, const struct curve *c, const uint32_t *patch,
+static int rank_patches(const struct model *m, const struct morton_curve *c, const uint32_t *patch,
                         size_t patches, uint32_t *rank, struct err *e)
 {
 	struct place *place = mem_new(patches, sizeof *place, "patches", e);
 	double *sum = mem_new(patches, 4 * sizeof *sum, "patches", e);
 
-	for (size_t i = 0; place && sum && i < m->elements; i++) {
+	for (size_t i = 0; place && sum && i < m->element.n; i++) {
 		double x[3], area = centroid(m, c, i, x), *s = &sum[4 * (size_t)patch[i]];
 		v3_mad(s, area, x, s);
 		s[3] += area;
@@ -66,7 +66,7 @@ static int rank_patches(const struct model *m, const struct curve *c, const uint
 		double x[3];
 		for (size_t k = 0; k < 3; k++)
 			x[k] = sum[4 * p + k] / sum[4 * p + 3];
-		place[p] = (struct place){ morton(c, x), 0, (uint32_t)p };
+		place[p] = (struct place){ geo_morton(c, x), 0, (uint32_t)p };
 	}
 	int status = place && sum ? 0 : -1;
 	if (!status) {
@@ -80,27 +80,27 @@ static int rank_patches(const struct model *m, const struct curve *c, const uint
 }
 
 /* The elements in their new order, with their new patches. */
-static struct place *sort_elements(const struct model *m, const struct curve *c,
+static struct place *sort_elements(const struct model *m, const struct morton_curve *c,
                                    const uint32_t *patch, const uint32_t *rank,
                                    struct err *e)
 {
-	struct place *place = mem_new(m->elements, sizeof *place, "elements", e);
+	struct place *place = mem_new(m->element.n, sizeof *place, "elements", e);
 
 	if (!place)
 		return NULL;
-	for (size_t i = 0; i < m->elements; i++) {
+	for (size_t i = 0; i < m->element.n; i++) {
 		double x[3];
 		centroid(m, c, i, x);
-		place[i] = (struct place){ morton(c, x), rank[patch[i]], (uint32_t)i };
+		place[i] = (struct place){ geo_morton(c, x), rank[patch[i]], (uint32_t)i };
 	}
-	qsort(place, m->elements, sizeof *place, compare_places);
+	qsort(place, m->element.n, sizeof *place, compare_places);
 	return place;
 }
 
 /* Moves elements to their new places and tells the split trees. */
 static int move_elements(struct model *m, const struct place *place, struct err *e)
 {
-	size_t n = m->elements;
+	size_t n = m->element.n;
 	uint32_t *element = mem_new(n, 3 * sizeof *element, "elements", e);
 	uint32_t *triangle = mem_new(n, sizeof *triangle, "elements", e);
 	uint32_t *moved = mem_new(n, sizeof *moved, "elements", e);
@@ -113,22 +113,22 @@ static int move_elements(struct model *m, const struct place *place, struct err 
 	}
 	for (size_t i = 0; i < n; i++) {
 		uint32_t old = place[i].old;
-		memcpy(&element[3 * i], &m->element[3 * (size_t)old], 3 * sizeof *element);
-		triangle[i] = m->element_triangle[old];
+		memcpy(&element[3 * i], &m->element.corner[3 * (size_t)old], 3 * sizeof *element);
+		triangle[i] = m->element.triangle[old];
 		moved[old] = (uint32_t)i;
 	}
-	for (size_t t = 0; t < m->triangles; t++)
-		if (m->triangle_split[t] < 0)
-			m->triangle_split[t] = ~(int32_t)moved[~m->triangle_split[t]];
+	for (size_t t = 0; t < m->triangle.n; t++)
+		if (m->triangle.split[t] < 0)
+			m->triangle.split[t] = ~(int32_t)moved[~m->triangle.split[t]];
 	for (size_t s = 0; s < m->splits; s++)
 		for (int k = 0; k < 2; k++)
 			if (m->split[s].child[k] < 0)
 				m->split[s].child[k] = ~(int32_t)moved[~m->split[s].child[k]];
 	free(moved);
-	free(m->element);
-	free(m->element_triangle);
-	m->element = element;
-	m->element_triangle = triangle;
+	free(m->element.corner);
+	free(m->element.triangle);
+	m->element.corner = element;
+	m->element.triangle = triangle;
 	return 0;
 }
 
@@ -136,16 +136,16 @@ static int move_elements(struct model *m, const struct place *place, struct err 
 static int fill_patches(struct model *m, const struct place *place, size_t patches,
                         struct err *e)
 {
-	m->patch_start = mem_new(patches + 1, sizeof *m->patch_start, "patches", e);
-	m->patch_surface = mem_new(patches, sizeof *m->patch_surface, "patches", e);
-	if (!m->patch_start || !m->patch_surface)
+	m->patch.start = mem_new(patches + 1, sizeof *m->patch.start, "patches", e);
+	m->patch.surface = mem_new(patches, sizeof *m->patch.surface, "patches", e);
+	if (!m->patch.start || !m->patch.surface)
 		return -1;
-	m->patches = patches;
-	for (size_t i = m->elements; i-- > 0;) {
-		m->patch_start[place[i].patch] = (uint32_t)i;
-		m->patch_surface[place[i].patch] = m->triangle_surface[m->element_triangle[i]];
+	m->patch.n = patches;
+	for (size_t i = m->element.n; i-- > 0;) {
+		m->patch.start[place[i].patch] = (uint32_t)i;
+		m->patch.surface[place[i].patch] = m->triangle.surface[m->element.triangle[i]];
 	}
-	m->patch_start[patches] = (uint32_t)m->elements;
+	m->patch.start[patches] = (uint32_t)m->element.n;
 	return 0;
 }
 
@@ -161,8 +161,8 @@ static int order_vertices(struct model *m, struct err *e)
 		free(vertex);
 		return -1;
 	}
-	for (size_t i = 0; i < 3 * m->elements; i++) {
-		uint32_t *v = &m->element[i];
+	for (size_t i = 0; i < 3 * m->element.n; i++) {
+		uint32_t *v = &m->element.corner[i];
 		if (!moved[*v]) {
 			memcpy(&vertex[3 * (size_t)n], &m->vertex[3 * (size_t)*v],
 			       3 * sizeof *vertex);
@@ -170,8 +170,8 @@ static int order_vertices(struct model *m, struct err *e)
 		}
 		*v = moved[*v] - 1;
 	}
-	for (size_t i = 0; i < 3 * m->triangles; i++)
-		m->triangle[i] = moved[m->triangle[i]] - 1;
+	for (size_t i = 0; i < 3 * m->triangle.n; i++)
+		m->triangle.corner[i] = moved[m->triangle.corner[i]] - 1;
 	free(moved);
 	free(m->vertex);
 	m->vertex = vertex;
@@ -193,11 +193,11 @@ static int move_origins(uint32_t *origin, const struct place *place, size_t n, s
 	return 0;
 }
 
-static int order(struct model *m, const struct curve *c, const uint32_t *patch, size_t patches,
+static int order(struct model *m, const struct morton_curve *c, const uint32_t *patch, size_t patches,
                  const uint32_t *rank, uint32_t *origin, struct err *e)
 {
 	struct place *place = sort_elements(m, c, patch, rank, e);
-	int status = place && (!origin || !move_origins(origin, place, m->elements, e)) &&
+	int status = place && (!origin || !move_origins(origin, place, m->element.n, e)) &&
 	             !move_elements(m, place, e) && !fill_patches(m, place, patches, e) &&
 	             !order_vertices(m, e) ? 0 : -1;
 
@@ -205,9 +205,9 @@ static int order(struct model *m, const struct curve *c, const uint32_t *patch, 
 	return status;
 }
 
-int order_model(struct model *m, const uint32_t *patch, size_t patches, struct err *e)
+int mesh_order_model(struct model *m, const uint32_t *patch, size_t patches, struct err *e)
 {
-	struct curve c = scene_curve(m);
+	struct morton_curve c = scene_curve(m);
 	uint32_t *rank = mem_new(patches, sizeof *rank, "patches", e);
 	int status = rank && !rank_patches(m, &c, patch, patches, rank, e) &&
 	             !order(m, &c, patch, patches, rank, NULL, e) ? 0 : -1;
@@ -216,10 +216,10 @@ int order_model(struct model *m, const uint32_t *patch, size_t patches, struct e
 	return status;
 }
 
-int order_elements(struct model *m, const uint32_t *patch, size_t patches, uint32_t *origin,
-                   struct err *e)
+int mesh_order_elements(struct model *m, const uint32_t *patch, size_t patches, uint32_t *origin,
+                        struct err *e)
 {
-	struct curve c = scene_curve(m);
+	struct morton_curve c = scene_curve(m);
 	uint32_t *rank = mem_new(patches, sizeof *rank, "patches", e);
 
 	for (size_t p = 0; rank && p < patches; p++)

@@ -43,22 +43,22 @@ static const double *vertex(const struct tracer *t, uint32_t v)
 static int planar(struct tracer *t, uint32_t begin, uint32_t end)
 {
 	const struct model *m = t->m;
-	const double *origin = vertex(t, m->element[3 * (size_t)begin]);
+	const double *origin = vertex(t, m->element.corner[3 * (size_t)begin]);
 	double extent = 0, lowest = 0, highest = 0, *n = t->normal;
 
 	n[0] = n[1] = n[2] = 0;
 	for (uint32_t i = begin; i < end; i++)
-		v3_mad(n, m->element_area[i], &m->element_normal[3 * (size_t)i], n);
+		v3_mad(n, m->element.area[i], &m->element.normal[3 * (size_t)i], n);
 	v3_normalise(n);
 	for (size_t i = 3 * (size_t)begin; i < 3 * (size_t)end; i++) {
 		double d[3];
-		v3_sub(vertex(t, m->element[i]), origin, d);
+		v3_sub(vertex(t, m->element.corner[i]), origin, d);
 		extent = fmax(extent, v3_length(d));
 		lowest = fmin(lowest, v3_dot(d, n));
 		highest = fmax(highest, v3_dot(d, n));
 	}
 	for (uint32_t i = begin; i < end; i++)
-		if (v3_dot(&m->element_normal[3 * (size_t)i], n) <= 0)
+		if (v3_dot(&m->element.normal[3 * (size_t)i], n) <= 0)
 			return 0;
 	return highest - lowest <= 1e-5 * extent;
 }
@@ -86,14 +86,14 @@ static const struct arc *find_arc(const struct tracer *t, uint32_t from, uint32_
 static int collect_arcs(struct tracer *t, uint32_t n)
 {
 	t->arc.n = t->done.n = 0;
-	if (vec_reserve(&t->arc, 3 * (size_t)n, sizeof(struct arc), t->e) ||
-	    vec_reserve(&t->done, 3 * (size_t)n, 1, t->e))
+	if (mem_reserve(&t->arc, 3 * (size_t)n, sizeof(struct arc), t->e) ||
+	    mem_reserve(&t->done, 3 * (size_t)n, 1, t->e))
 		return -1;
 	t->arc.n = t->done.n = 3 * (size_t)n;
 	memset(t->done.data, 0, t->done.n);
 	struct arc *a = t->arc.data;
 	for (uint32_t h = 0; h < 3 * n; h++)
-		a[h] = (struct arc){ half_from(t->element, h), half_to(t->element, h), h };
+		a[h] = (struct arc){ geo_half_edge_from(t->element, h), geo_half_edge_to(t->element, h), h };
 	qsort(a, t->arc.n, sizeof *a, compare_arcs);
 	for (size_t i = 1; i < t->arc.n; i++)
 		if (!compare_arcs(&a[i], &a[i - 1]))
@@ -106,8 +106,8 @@ static uint32_t next_boundary(const struct tracer *t, uint32_t h)
 {
 	for (;;) {
 		h = h % 3 == 2 ? h - 2 : h + 1;
-		const struct arc *twin = find_arc(t, half_to(t->element, h),
-		                                  half_from(t->element, h));
+		const struct arc *twin = find_arc(t, geo_half_edge_to(t->element, h),
+		                                  geo_half_edge_from(t->element, h));
 		if (!twin)
 			return h;
 		h = twin->half;
@@ -175,7 +175,7 @@ static int trace_loop(struct tracer *t, uint32_t h)
 
 	for (; !done[h]; h = next_boundary(t, h)) {
 		done[h] = 1;
-		if (vec_append(&t->corner, &t->element[h], 1, sizeof *t->element, t->e))
+		if (mem_append(&t->corner, &t->element[h], 1, sizeof *t->element, t->e))
 			return -1;
 	}
 	straighten(t, l.begin);
@@ -185,7 +185,7 @@ static int trace_loop(struct tracer *t, uint32_t h)
 	}
 	l.end = (uint32_t)t->corner.n;
 	l.area = loop_area(t, (uint32_t *)t->corner.data + l.begin, l.end - l.begin);
-	return vec_append(&t->loop, &l, 1, sizeof l, t->e);
+	return mem_append(&t->loop, &l, 1, sizeof l, t->e);
 }
 
 /* The outer loop, the one with the largest area, first; holes as they come. */
@@ -201,11 +201,11 @@ static int append_loops(struct tracer *t)
 	memmove(l + 1, l, outer * sizeof *l);
 	l[0] = first;
 	for (size_t i = 0; i < t->loop.n; i++) {
-		if (vec_append(&t->index, (uint32_t *)t->corner.data + l[i].begin,
+		if (mem_append(&t->index, (uint32_t *)t->corner.data + l[i].begin,
 		               l[i].end - l[i].begin, sizeof(uint32_t), t->e))
 			return -1;
 		uint64_t end = t->index.n;
-		if (vec_append(&t->start, &end, 1, sizeof end, t->e))
+		if (mem_append(&t->start, &end, 1, sizeof end, t->e))
 			return -1;
 	}
 	return 0;
@@ -216,14 +216,14 @@ static int trace_patch(struct tracer *t, uint32_t begin, uint32_t end)
 {
 	if (!planar(t, begin, end))
 		return 0;
-	t->element = &t->m->element[3 * (size_t)begin];
+	t->element = &t->m->element.corner[3 * (size_t)begin];
 	t->corner.n = t->loop.n = 0;
 	int overlap = collect_arcs(t, end - begin);
 	if (overlap)
 		return overlap < 0 ? -1 : 0;
 	for (uint32_t h = 0; h < 3 * (end - begin); h++) {
 		if (((uint8_t *)t->done.data)[h] ||
-		    find_arc(t, half_to(t->element, h), half_from(t->element, h)))
+		    find_arc(t, geo_half_edge_to(t->element, h), geo_half_edge_from(t->element, h)))
 			continue;
 		if (trace_loop(t, h))
 			return -1;
@@ -238,28 +238,28 @@ static int trace_all(struct tracer *t, size_t *planar_patches)
 	struct model *m = t->m;
 	uint64_t zero = 0;
 
-	m->patch_loop = mem_new(m->patches + 1, sizeof *m->patch_loop, "outlines", t->e);
-	if (!m->patch_loop || vec_append(&t->start, &zero, 1, sizeof zero, t->e))
+	m->patch.loop = mem_new(m->patch.n + 1, sizeof *m->patch.loop, "outlines", t->e);
+	if (!m->patch.loop || mem_append(&t->start, &zero, 1, sizeof zero, t->e))
 		return -1;
-	for (size_t p = 0; p < m->patches; p++) {
-		int traced = trace_patch(t, m->patch_start[p], m->patch_start[p + 1]);
+	for (size_t p = 0; p < m->patch.n; p++) {
+		int traced = trace_patch(t, m->patch.start[p], m->patch.start[p + 1]);
 		if (traced < 0)
 			return -1;
 		*planar_patches += (size_t)traced;
-		m->patch_loop[p + 1] = t->start.n - 1;
+		m->patch.loop[p + 1] = t->start.n - 1;
 	}
 	/* mem_new's arrays are never NULL; neither are these. */
-	if (vec_reserve(&t->index, 1, sizeof(uint32_t), t->e))
+	if (mem_reserve(&t->index, 1, sizeof(uint32_t), t->e))
 		return -1;
-	m->loops = t->start.n - 1;
-	m->loop_start = t->start.data;
-	m->loop_indices = t->index.n;
-	m->loop_index = t->index.data;
+	m->patch.loops = t->start.n - 1;
+	m->patch.loop_start = t->start.data;
+	m->patch.loop_indices = t->index.n;
+	m->patch.loop_index = t->index.data;
 	t->start.data = t->index.data = NULL;
 	return 0;
 }
 
-int outline_patches(struct model *m, size_t *planar_patches, struct err *e)
+int mesh_outline_patches(struct model *m, size_t *planar_patches, struct err *e)
 {
 	struct tracer t = { .m = m, .e = e };
 	int status = trace_all(&t, planar_patches);

@@ -60,7 +60,7 @@ static int queue_group(struct merger *g, uint32_t i)
 {
 	struct entry new = { g->group[i].area, g->group[i].name, i, g->group[i].version };
 
-	if (vec_append(&g->heap, &new, 1, sizeof new, g->e))
+	if (mem_append(&g->heap, &new, 1, sizeof new, g->e))
 		return -1;
 	struct entry *h = g->heap.data;
 	size_t at = g->heap.n - 1;
@@ -102,7 +102,7 @@ static void add_element(struct merger *g, uint32_t element)
 {
 	const struct division *d = g->d;
 	struct group *to = &g->group[g->patch[element]];
-	uint64_t name = element_name(&d->m->element[3 * (size_t)element]);
+	uint64_t name = element_name(&d->m->element.corner[3 * (size_t)element]);
 
 	g->next[element] = NONE;
 	if (to->first == NONE) {
@@ -118,7 +118,7 @@ static void add_element(struct merger *g, uint32_t element)
 	v3_mad(to->normal, 1, &d->area[3 * (size_t)element], to->normal);
 	for (int k = 0; k < 3; k++) {
 		double lo, hi;
-		division_extent(d, element, d->region[to->region].axis[k], &lo, &hi);
+		mesh_division_extent(d, element, d->region[to->region].axis[k], &lo, &hi);
 		to->lo[k] = fmin(to->lo[k], lo);
 		to->hi[k] = fmax(to->hi[k], hi);
 	}
@@ -130,7 +130,7 @@ static int make_groups(struct merger *g, size_t count)
 		g->group[i] = (struct group){ .lo = { INFINITY, INFINITY, INFINITY },
 			                      .hi = { -INFINITY, -INFINITY, -INFINITY },
 			                      .first = NONE };
-	for (uint32_t i = 0; i < g->d->m->elements; i++)
+	for (uint32_t i = 0; i < g->d->m->element.n; i++)
 		add_element(g, i);
 	for (uint32_t i = 0; i < count; i++) {
 		g->group[i].area = coarse(g->group[i].area);
@@ -149,7 +149,7 @@ static int add_border(struct merger *g, uint32_t group, double length)
 			b[i].length += length;
 			return 0;
 		}
-	return vec_append(&g->border, &new, 1, sizeof new, g->e);
+	return mem_append(&g->border, &new, 1, sizeof new, g->e);
 }
 
 static int compare_borders(const void *pa, const void *pb)
@@ -164,7 +164,7 @@ static int compare_borders(const void *pa, const void *pb)
 /* The neighbours of a group in its region, those with the longest border first. */
 static int find_borders(struct merger *g, uint32_t group)
 {
-	const struct edges *edges = &g->d->g;
+	const struct half_edges *edges = &g->d->g;
 	const struct model *m = g->d->m;
 
 	g->border.n = 0;
@@ -173,8 +173,8 @@ static int find_borders(struct merger *g, uint32_t group)
 			uint32_t begin = edges->start[edges->of[h]];
 			uint32_t end = edges->start[edges->of[h] + 1];
 			double d[3];
-			v3_sub(&m->vertex[3 * (size_t)half_to(m->element, h)],
-			       &m->vertex[3 * (size_t)half_from(m->element, h)], d);
+			v3_sub(&m->vertex[3 * (size_t)geo_half_edge_to(m->element.corner, h)],
+			       &m->vertex[3 * (size_t)geo_half_edge_from(m->element.corner, h)], d);
 			for (uint32_t u = begin; u < end && end - begin <= CROWD; u++) {
 				uint32_t other = g->patch[edges->use[u] / 3];
 				if (other != group &&
@@ -262,17 +262,17 @@ static void renumber(struct merger *g, size_t *count)
 	for (size_t i = 0; i < *count; i++)
 		if (g->group[i].first != NONE)
 			g->group[i].version = (uint32_t)left++;
-	for (size_t i = 0; i < g->d->m->elements; i++)
+	for (size_t i = 0; i < g->d->m->element.n; i++)
 		g->patch[i] = g->group[g->patch[i]].version;
 	*count = left;
 }
 
-int merge_patches(const struct division *d, uint32_t *patch, size_t *count, struct err *e)
+int mesh_merge_patches(const struct division *d, uint32_t *patch, size_t *count, struct err *e)
 {
 	struct merger g = { .d = d, .patch = patch, .e = e };
 	int status = -1;
 
-	g.next = mem_new(d->m->elements, sizeof *g.next, "patches", e);
+	g.next = mem_new(d->m->element.n, sizeof *g.next, "patches", e);
 	g.group = mem_new(*count, sizeof *g.group, "patches", e);
 	if (!g.next || !g.group || make_groups(&g, *count))
 		goto done;

@@ -31,10 +31,10 @@ struct divider {
 	struct err *e;
 };
 
-void division_extent(const struct division *d, uint32_t element, const double axis[3],
-                     double *lo, double *hi)
+void mesh_division_extent(const struct division *d, uint32_t element, const double axis[3],
+                          double *lo, double *hi)
 {
-	const uint32_t *c = &d->m->element[3 * (size_t)element];
+	const uint32_t *c = &d->m->element.corner[3 * (size_t)element];
 
 	*lo = INFINITY, *hi = -INFINITY;
 	for (int k = 0; k < 3; k++) {
@@ -58,14 +58,14 @@ static int push_piece(struct divider *d, uint32_t begin, uint32_t end,
 		const double *axis = d->d.region[p.region].axis[k];
 		double lo = INFINITY, hi = -INFINITY, low, high;
 		for (uint32_t i = begin; i < end; i++) {
-			division_extent(&d->d, d->queue[i], axis, &low, &high);
+			mesh_division_extent(&d->d, d->queue[i], axis, &low, &high);
 			lo = fmin(lo, low);
 			hi = fmax(hi, high);
 		}
 		p.lo[k] = fmax(p.lo[k], lo);
 		p.hi[k] = fmin(p.hi[k], hi);
 	}
-	return vec_append(&d->todo, &p, 1, sizeof p, d->e);
+	return mem_append(&d->todo, &p, 1, sizeof p, d->e);
 }
 
 /* Appends to the queue the elements with the given label that element's edges
@@ -281,8 +281,8 @@ static void element_centroids(struct division *d)
 	v3_mad(lo, 1, hi, d->centre);
 	for (int k = 0; k < 3; k++)
 		d->centre[k] *= .5;
-	for (size_t i = 0; i < m->elements; i++) {
-		const uint32_t *c = &m->element[3 * i];
+	for (size_t i = 0; i < m->element.n; i++) {
+		const uint32_t *c = &m->element.corner[3 * i];
 		for (size_t k = 0; k < 3; k++) {
 			double x[3];
 			v3_sub(&m->vertex[3 * (size_t)c[k]], d->centre, x);
@@ -298,7 +298,7 @@ static int push_regions(struct divider *d, size_t regions)
 {
 	const uint32_t *region = d->d.element_region;
 	uint32_t *start = mem_new(regions + 1, sizeof *start, "regions", d->e);
-	size_t n = d->d.m->elements;
+	size_t n = d->d.m->element.n;
 	int status = start ? 0 : -1;
 
 	for (size_t i = 0; start && i < n; i++)
@@ -323,7 +323,7 @@ static int push_regions(struct divider *d, size_t regions)
 static int push_patches(struct divider *d, const uint32_t *old, size_t patches,
                         const uint8_t *halvings)
 {
-	size_t n = d->d.m->elements;
+	size_t n = d->d.m->element.n;
 	uint32_t *start = mem_new(patches + 2, sizeof *start, "patches", d->e);
 	int status = start ? 0 : -1;
 
@@ -351,14 +351,14 @@ static int push_patches(struct divider *d, const uint32_t *old, size_t patches,
 static int assign_regions(struct divider *d, size_t *regions)
 {
 	struct division *v = &d->d;
-	uint32_t *region = mem_new(v->m->triangles, sizeof *region, "regions", d->e);
-	int status = region ? find_regions(v->m, v->size, v->cos_cone, region, &v->region,
-	                                   regions, d->e)
+	uint32_t *region = mem_new(v->m->triangle.n, sizeof *region, "regions", d->e);
+	int status = region ? mesh_find_regions(v->m, v->size, v->cos_cone, region, &v->region,
+	                                        regions, d->e)
 	                    : -1;
 
-	v->element_region = mem_new(v->m->elements, sizeof *v->element_region, "regions", d->e);
-	for (size_t i = 0; !status && v->element_region && i < v->m->elements; i++)
-		v->element_region[i] = region[v->m->element_triangle[i]];
+	v->element_region = mem_new(v->m->element.n, sizeof *v->element_region, "regions", d->e);
+	for (size_t i = 0; !status && v->element_region && i < v->m->element.n; i++)
+		v->element_region[i] = region[v->m->element.triangle[i]];
 	free(region);
 	return v->element_region ? status : -1;
 }
@@ -366,9 +366,9 @@ static int assign_regions(struct divider *d, size_t *regions)
 static int allocate(struct divider *d)
 {
 	struct division *v = &d->d;
-	size_t n = v->m->elements;
+	size_t n = v->m->element.n;
 
-	if (edges_build(&v->g, v->m->element, n, v->m->vertices, d->e))
+	if (geo_half_edges_build(&v->g, v->m->element.corner, n, v->m->vertices, d->e))
 		return -1;
 	v->centroid = mem_new(n, 3 * sizeof *v->centroid, "patches", d->e);
 	v->area = mem_new(n, 3 * sizeof *v->area, "patches", d->e);
@@ -382,7 +382,7 @@ static int allocate(struct divider *d)
 
 static void release(struct divider *d)
 {
-	edges_free(&d->d.g);
+	geo_half_edges_free(&d->d.g);
 	free(d->d.region);
 	free(d->d.element_region);
 	free(d->d.centroid);
@@ -394,8 +394,8 @@ static void release(struct divider *d)
 	free(d->todo.data);
 }
 
-int find_patches(const struct model *m, double size, double cos_cone, uint32_t *patch,
-                 size_t *count, struct err *e)
+int mesh_find_patches(const struct model *m, double size, double cos_cone, uint32_t *patch,
+                      size_t *count, struct err *e)
 {
 	int status = -1;
 	size_t regions;
@@ -407,15 +407,15 @@ int find_patches(const struct model *m, double size, double cos_cone, uint32_t *
 	element_centroids(&d.d);
 	if (push_regions(&d, regions) || divide(&d, patch, count))
 		goto done;
-	status = merge_patches(&d.d, patch, count, e);
+	status = mesh_merge_patches(&d.d, patch, count, e);
 done:
 	release(&d);
 	return status;
 }
 
-int split_patches(const struct model *m, double size, double cos_cone, const uint32_t *old,
-                  size_t patches, const uint8_t *halvings, uint32_t *patch, size_t *count,
-                  struct err *e)
+int mesh_split_patches(const struct model *m, double size, double cos_cone, const uint32_t *old,
+                       size_t patches, const uint8_t *halvings, uint32_t *patch, size_t *count,
+                       struct err *e)
 {
 	int status = -1;
 	size_t regions;

@@ -14,7 +14,7 @@ enum { CROWD = 8 /* uses of an edge that are compared with one another */ };
 
 struct finder {
 	const struct model *m;
-	struct edges g;
+	struct half_edges g;
 	double *area;         /* [triangles][3] area vectors */
 	uint32_t *plane;      /* sets of coplanar neighbours */
 	uint32_t *region;     /* sets of neighbours that bend little */
@@ -28,12 +28,12 @@ struct finder {
  * opposite ways. */
 static void for_neighbours(struct finder *f, void (*join)(struct finder *, uint32_t, uint32_t))
 {
-	const uint32_t *tri = f->m->triangle;
+	const uint32_t *tri = f->m->triangle.corner;
 
 	for (size_t i = 0; i < f->g.n; i++)
 		for (uint32_t u = f->g.start[i]; u < f->g.start[i + 1]; u++)
 			for (uint32_t v = u + 1; v < f->g.start[i + 1] && v <= u + CROWD; v++)
-				if (half_from(tri, f->g.use[u]) == half_to(tri, f->g.use[v]))
+				if (geo_half_edge_from(tri, f->g.use[u]) == geo_half_edge_to(tri, f->g.use[v]))
 					join(f, f->g.use[u], f->g.use[v]);
 }
 
@@ -52,27 +52,27 @@ static void join_coplanar(struct finder *f, uint32_t g, uint32_t h)
 
 	int swap = v3_dot(a, a) < v3_dot(b, b);
 	memcpy(n, swap ? b : a, sizeof n);
-	v3_sub(&m->vertex[3 * (size_t)half_apex(m->triangle, swap ? g : h)],
-	       &m->vertex[3 * (size_t)half_from(m->triangle, g)], d);
+	v3_sub(&m->vertex[3 * (size_t)geo_half_edge_apex(m->triangle.corner, swap ? g : h)],
+	       &m->vertex[3 * (size_t)geo_half_edge_from(m->triangle.corner, g)], d);
 	v3_normalise(n);
 	if (cosine(a, b) > .9 && fabs(v3_dot(n, d)) <= 1e-6 * v3_length(d) + f->noise)
-		sets_join(f->plane, g / 3, h / 3);
+		geo_sets_join(f->plane, g / 3, h / 3);
 }
 
 static void join_smooth(struct finder *f, uint32_t g, uint32_t h)
 {
-	if (f->large[sets_find(f->plane, g / 3)] || f->large[sets_find(f->plane, h / 3)])
+	if (f->large[geo_sets_find(f->plane, g / 3)] || f->large[geo_sets_find(f->plane, h / 3)])
 		return;
 	if (cosine(&f->area[3 * (size_t)(g / 3)], &f->area[3 * (size_t)(h / 3)]) >= f->cos_cone)
-		sets_join(f->region, g / 3, h / 3);
+		geo_sets_join(f->region, g / 3, h / 3);
 }
 
 static void triangle_areas(struct finder *f)
 {
 	const struct model *m = f->m;
 
-	for (size_t t = 0; t < m->triangles; t++) {
-		const uint32_t *c = &m->triangle[3 * t];
+	for (size_t t = 0; t < m->triangle.n; t++) {
+		const uint32_t *c = &m->triangle.corner[3 * t];
 		v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
 		        &m->vertex[3 * (size_t)c[2]], &f->area[3 * t]);
 	}
@@ -85,23 +85,23 @@ static void mark_large(struct finder *f, double width, double *sum)
 {
 	const struct model *m = f->m;
 
-	for (uint32_t t = 0; t < m->triangles; t++) {
-		double *s = &sum[5 * (size_t)sets_find(f->plane, t)];
+	for (uint32_t t = 0; t < m->triangle.n; t++) {
+		double *s = &sum[5 * (size_t)geo_sets_find(f->plane, t)];
 		double weight = v3_length(&f->area[3 * (size_t)t]) / 3;
 		for (size_t k = 0; k < 3; k++)
-			v3_mad(s, weight, &m->vertex[3 * (size_t)m->triangle[3 * (size_t)t + k]],
+			v3_mad(s, weight, &m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)t + k]],
 			       s);
 		s[3] += 3 * weight;
 	}
-	for (uint32_t t = 0; t < m->triangles; t++) {
-		double *s = &sum[5 * (size_t)sets_find(f->plane, t)], d[3];
+	for (uint32_t t = 0; t < m->triangle.n; t++) {
+		double *s = &sum[5 * (size_t)geo_sets_find(f->plane, t)], d[3];
 		for (size_t k = 0; k < 3; k++) {
-			v3_mad(&m->vertex[3 * (size_t)m->triangle[3 * (size_t)t + k]], -1 / s[3],
+			v3_mad(&m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)t + k]], -1 / s[3],
 			       s, d);
 			s[4] = fmax(s[4], v3_length(d));
 		}
 	}
-	for (size_t t = 0; t < m->triangles; t++)
+	for (size_t t = 0; t < m->triangle.n; t++)
 		f->large[t] = sum[5 * t + 3] > 2 * width * sum[5 * t + 4];
 }
 
@@ -111,8 +111,8 @@ static int number_regions(struct finder *f, uint32_t *region, struct region **ou
 {
 	size_t n = 0;
 
-	for (uint32_t t = 0; t < f->m->triangles; t++) {
-		uint32_t root = sets_find(f->region, t);
+	for (uint32_t t = 0; t < f->m->triangle.n; t++) {
+		uint32_t root = geo_sets_find(f->region, t);
 		region[t] = root == t ? (uint32_t)n++ : region[root];
 	}
 	*out = mem_new(n, sizeof **out, "regions", e);
@@ -152,8 +152,8 @@ static void find_guides(const struct finder *f, const uint32_t *region, struct g
 			uint32_t h = f->g.use[u];
 			struct guide *best = &guide[region[h / 3]], new = { .half = h };
 			double d[3];
-			v3_sub(&m->vertex[3 * (size_t)half_to(m->triangle, h)],
-			       &m->vertex[3 * (size_t)half_from(m->triangle, h)], d);
+			v3_sub(&m->vertex[3 * (size_t)geo_half_edge_to(m->triangle.corner, h)],
+			       &m->vertex[3 * (size_t)geo_half_edge_from(m->triangle.corner, h)], d);
 			new.length = coarse(v3_dot(d, d));
 			new.boundary = (uint8_t)on_boundary(f, region, i, u);
 			if (new.boundary > best->boundary ||
@@ -169,8 +169,8 @@ static void frame_along(const struct model *m, uint32_t half, const double norma
 	double *u = axis[0], *n = axis[2];
 
 	memcpy(n, normal, 3 * sizeof *n);
-	v3_sub(&m->vertex[3 * (size_t)half_to(m->triangle, half)],
-	       &m->vertex[3 * (size_t)half_from(m->triangle, half)], u);
+	v3_sub(&m->vertex[3 * (size_t)geo_half_edge_to(m->triangle.corner, half)],
+	       &m->vertex[3 * (size_t)geo_half_edge_from(m->triangle.corner, half)], u);
 	v3_normalise(u);
 	v3_mad(u, -v3_dot(u, n), n, u);
 	if (v3_normalise(u) < 1e-3)
@@ -222,9 +222,9 @@ static void choose_frames(const struct finder *f, const uint32_t *region,
 	const struct model *m = f->m;
 	double x[3];
 
-	for (size_t i = 0; i < 3 * m->triangles; i++)
+	for (size_t i = 0; i < 3 * m->triangle.n; i++)
 		for (size_t k = 0; k < 3; k++) {
-			v3_sub(&m->vertex[3 * (size_t)m->triangle[i]], f->origin, x);
+			v3_sub(&m->vertex[3 * (size_t)m->triangle.corner[i]], f->origin, x);
 			widen(&c[3 * (size_t)region[i / 3] + k], x);
 		}
 	for (size_t i = 0; i < count; i++) {
@@ -246,7 +246,7 @@ static int set_frames(const struct finder *f, const uint32_t *region, struct reg
 
 	if (!status) {
 		find_guides(f, region, guide);
-		for (size_t t = 0; t < f->m->triangles; t++) {
+		for (size_t t = 0; t < f->m->triangle.n; t++) {
 			double *s = &sum[4 * (size_t)region[t]];
 			v3_mad(s, 1, &f->area[3 * t], s);
 			s[3] += v3_length(&f->area[3 * t]);
@@ -261,21 +261,21 @@ static int set_frames(const struct finder *f, const uint32_t *region, struct reg
 	return status;
 }
 
-int find_regions(const struct model *m, double size, double cos_cone, uint32_t *region,
-                 struct region **regions, size_t *count, struct err *e)
+int mesh_find_regions(const struct model *m, double size, double cos_cone, uint32_t *region,
+                      struct region **regions, size_t *count, struct err *e)
 {
 	int status = -1;
-	size_t n = m->triangles;
+	size_t n = m->triangle.n;
 	double lo[3], hi[3], diagonal[3];
 	struct finder f = { .m = m, .cos_cone = cos_cone };
 	double *sum = mem_new(n, 5 * sizeof *sum, "regions", e);
 
 	f.area = mem_new(n, 3 * sizeof *f.area, "regions", e);
-	f.plane = sets_new(n, e);
-	f.region = sets_new(n, e);
+	f.plane = geo_sets_new(n, e);
+	f.region = geo_sets_new(n, e);
 	f.large = mem_new(n, 1, "regions", e);
 	if (!sum || !f.area || !f.plane || !f.region || !f.large ||
-	    edges_build(&f.g, m->triangle, n, m->vertices, e))
+	    geo_half_edges_build(&f.g, m->triangle.corner, n, m->vertices, e))
 		goto done;
 	model_box(m, lo, hi);
 	v3_sub(hi, lo, diagonal);
@@ -291,7 +291,7 @@ int find_regions(const struct model *m, double size, double cos_cone, uint32_t *
 		goto done;
 	status = set_frames(&f, region, *regions, *count, e);
 done:
-	edges_free(&f.g);
+	geo_half_edges_free(&f.g);
 	free(sum);
 	free(f.area);
 	free(f.plane);

@@ -1,4 +1,4 @@
-/* The stages of mesher_run, in the order in which it runs them. All return 0,
+/* The stages of mesh_run, in the order in which it runs them. All return 0,
  * or -1 and an error. */
 #ifndef TWOPASS_STAGES_H
 #define TWOPASS_STAGES_H
@@ -9,64 +9,64 @@
 
 /* degenerate.c: drops triangles without area, makes vertices surface by surface and
  * welds them. Vertices keep their order. */
-int clean_model(struct model *m, struct mesher_report *r, struct err *e);
+int mesh_clean_degenerate(struct model *m, struct mesh_report *r, struct err *e);
 
 /* A vertex of its own for each surface that uses it, in the order of the old
  * ones; group[v] becomes the surface of new vertex v, to be freed in any case. */
-int clean_separate(struct model *m, uint32_t **group, struct err *e);
+int mesh_clean_separate(struct model *m, uint32_t **group, struct err *e);
 
 /* Removes the triangles with keep[t] = 0 from all triangle arrays. */
-void clean_compact(struct model *m, const uint8_t *keep);
+void mesh_clean_compact(struct model *m, const uint8_t *keep);
 
 /* position[v] = number of the place of vertex v, the same for vertices of different surfaces
  * that coincide, to 2^-22 of the scene's diagonal: what float32 positions are off by once
  * their nodes have moved them. To be freed; NULL and e on failure. */
-uint32_t *clean_positions(const struct model *m, size_t *places, struct err *e);
+uint32_t *mesh_clean_positions(const struct model *m, size_t *places, struct err *e);
 
 /* coincident.c: drops triangles, and pairs that make up the same plane quad,
  * which coincide with ones of lower index. */
-int drop_duplicates(struct model *m, const uint32_t *position, struct mesher_report *r,
-                    struct err *e);
+int mesh_drop_coincident(struct model *m, const uint32_t *position, struct mesh_report *r,
+                         struct err *e);
 
 /* The side that dropped triangle t showed where the kept one in its place has its back:
- * twin[kept], as merge_sandwiches() wants it, unless that side is black. */
-void note_twin(const struct model *m, uint32_t t, uint32_t kept, uint64_t *twin);
+ * twin[kept], as mesh_merge_coincident_sheets() wants it, unless that side is black. */
+void mesh_note_twin(const struct model *m, uint32_t t, uint32_t kept, uint64_t *twin);
 
 /* coincident_sheets.c: gives kept triangles of one-sided materials the side that their
  * dropped twin showed where the kept one's black back was. twin[t] = 1 +
  * 2 (surface of the twin) + side of the twin, or 0. Called before compaction;
  * keep[t] tells which triangles stay. */
-int merge_sandwiches(struct model *m, const uint64_t *twin, const uint8_t *keep,
-                     struct mesher_report *r, struct err *e);
+int mesh_merge_coincident_sheets(struct model *m, const uint64_t *twin, const uint8_t *keep,
+                                 struct mesh_report *r, struct err *e);
 
 /* watertight.c: counts pieces, open edges and opposite windings. */
-int check_closed(const struct model *m, const uint32_t *position, size_t places,
-                 struct mesher_report *r, struct err *e);
+int mesh_check_watertight(const struct model *m, const uint32_t *position, size_t places,
+                          struct mesh_report *r, struct err *e);
 
 /* bisect.c: refuses a hopeless size before any work: no mesh of edges up to `size` has
  * fewer elements than its area over that of an equilateral triangle. */
-int check_element_size(const struct model *m, double size, struct err *e);
+int mesh_check_element_size(const struct model *m, double size, struct err *e);
 
 /* imprint.c: cuts triangles longer than `size` along the lines where others cross them
  * or stand on them, and parts the surface there: see imprint.h. */
-int imprint(struct model *m, double size, struct mesher_report *r, struct err *e);
+int mesh_imprint(struct model *m, double size, struct mesh_report *r, struct err *e);
 
 /* bisect.c: fills elements (in no useful order) and split trees so that no
  * edge is longer than `size`. Always the longest edge of a surface is halved,
  * together with all triangles that share it. */
-int subdivide(struct model *m, double size, struct err *e);
+int mesh_bisect(struct model *m, double size, struct err *e);
 
 /* Divides the elements of a model further, element i at least halvings[i] times, and its
  * neighbours where no edge would otherwise be halved. Replaces vertices, elements and split
  * trees; (*origin)[e] = the element that the new one was part of, to be freed. */
-int subdivide_further(struct model *m, const uint8_t *halvings, uint32_t **origin,
-                      struct err *e);
+int mesh_bisect_further(struct model *m, const uint8_t *halvings, uint32_t **origin,
+                        struct err *e);
 
 /* adapt.c: how often each element and each patch is to be halved; fills what r says of it.
  * `smallest` in metres. O(elements + patches log patches). */
-int adapt_plan(const struct model *m, const struct solution *s,
-               const struct mesher_refinement *how, double smallest, uint8_t *halvings,
-               uint8_t *patch_halvings, struct mesher_report *r, struct err *e);
+int mesh_adapt_plan(const struct model *m, const struct solution *s,
+                    const struct mesh_refinement *how, double smallest, uint8_t *halvings,
+                    uint8_t *patch_halvings, struct mesh_report *r, struct err *e);
 
 /* adapt_patches.c: the centroid of a patch and its mean front normal, unit. */
 struct patch_frame {
@@ -74,23 +74,23 @@ struct patch_frame {
 };
 
 /* [patches], to be freed; NULL and e on failure. O(elements). */
-struct patch_frame *patch_frames(const struct model *m, struct err *e);
+struct patch_frame *mesh_patch_frames(const struct model *m, struct err *e);
 
 /* Sum over a patch-side and over bands of squared deviations of its exitance from its mean,
  * less what noise there is in them: in the square of exitance times area. */
-double patch_deviations(const struct model *m, const struct solution *s, uint32_t patch,
-                        int side);
+double mesh_patch_deviations(const struct model *m, const struct solution *s, uint32_t patch,
+                             int side);
 
 /* Adds to energy[patches] what the differences of exitance within a patch, which it shoots as
- * if there were none, cost the surfaces next to it: in units of patch_deviations. 0, or -1
+ * if there were none, cost the surfaces next to it: in units of mesh_patch_deviations. 0, or -1
  * and e. */
-int patch_energies(const struct model *m, const struct solution *s,
-                   const struct patch_frame *frame, double *energy, struct err *e);
+int mesh_patch_energies(const struct model *m, const struct solution *s,
+                        const struct patch_frame *frame, double *energy, struct err *e);
 
 /* adapt_lobes.c: the same of what lobes of finite exponents light: they mirror a patch as if
  * its exitance were everywhere the same. O(uneven patch-sides x patch-sides with lobes). */
-int lobe_energies(const struct model *m, const struct solution *s,
-                  const struct patch_frame *frame, double *energy, struct err *e);
+int mesh_lobe_energies(const struct model *m, const struct solution *s,
+                       const struct patch_frame *frame, double *energy, struct err *e);
 
 /* regions.c: sets region[t] of input triangles: connected pieces of one surface,
  * plane or bending by less than the cone at each edge. */
@@ -98,13 +98,13 @@ struct region {
 	double axis[3][3];  /* its own frame; axis[2] is the mean normal */
 };
 
-int find_regions(const struct model *m, double size, double cos_cone, uint32_t *region,
-                 struct region **regions, size_t *count, struct err *e);
+int mesh_find_regions(const struct model *m, double size, double cos_cone, uint32_t *region,
+                      struct region **regions, size_t *count, struct err *e);
 
 /* What patches are made from. */
 struct division {
 	const struct model *m;
-	struct edges g;           /* of the elements */
+	struct half_edges g;           /* of the elements */
 	double centre[3];         /* of the scene: coordinates are taken from here */
 	double *centroid;         /* [elements][3] about the centre */
 	double *area;             /* [elements][3] area vectors */
@@ -114,33 +114,33 @@ struct division {
 };
 
 /* Range of an element along an axis. */
-void division_extent(const struct division *d, uint32_t element, const double axis[3],
-                     double *lo, double *hi);
+void mesh_division_extent(const struct division *d, uint32_t element, const double axis[3],
+                          double *lo, double *hi);
 
 /* patch_merge.c: joins patches of one region that together are still small and flat
  * enough. O(n log n) for well-shaped patches. */
-int merge_patches(const struct division *d, uint32_t *patch, size_t *count, struct err *e);
+int mesh_merge_patches(const struct division *d, uint32_t *patch, size_t *count, struct err *e);
 
 /* patches.c: divides regions into patches: patch[element], *count of them. */
-int find_patches(const struct model *m, double size, double cos_cone, uint32_t *patch,
-                 size_t *count, struct err *e);
+int mesh_find_patches(const struct model *m, double size, double cos_cone, uint32_t *patch,
+                      size_t *count, struct err *e);
 
 /* Halves earlier patches, old[element], so many times, but not to fewer than a few elements.
  * The parts of a patch follow those of the patch before it. */
-int split_patches(const struct model *m, double size, double cos_cone, const uint32_t *old,
-                  size_t patches, const uint8_t *halvings, uint32_t *patch, size_t *count,
-                  struct err *e);
+int mesh_split_patches(const struct model *m, double size, double cos_cone, const uint32_t *old,
+                       size_t patches, const uint8_t *halvings, uint32_t *patch, size_t *count,
+                       struct err *e);
 
 /* morton_order.c: renumbers patches, elements and vertices along a Morton curve over
  * the scene's box and fills the patch arrays. */
-int order_model(struct model *m, const uint32_t *patch, size_t patches, struct err *e);
+int mesh_order_model(struct model *m, const uint32_t *patch, size_t patches, struct err *e);
 
 /* The same for patches that keep their numbers; origin[element] moves with the elements. */
-int order_elements(struct model *m, const uint32_t *patch, size_t patches, uint32_t *origin,
-                   struct err *e);
+int mesh_order_elements(struct model *m, const uint32_t *patch, size_t patches, uint32_t *origin,
+                        struct err *e);
 
 /* outline.c: the loops of planar patches. Needs model_derive. */
-int outline_patches(struct model *m, size_t *planar, struct err *e);
+int mesh_outline_patches(struct model *m, size_t *planar, struct err *e);
 
 /* x rounded to 29 significant bits (Dekker's splitting), so that lengths which
  * differ by the rounding of a rotation compare equal. */

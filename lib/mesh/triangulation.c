@@ -7,9 +7,9 @@
 
 enum { PASSES_MAX = 64, PIECES_MAX = 1 << 28 };
 
-void set_triangle(struct cutter *c, uint32_t triangle)
+void mesh_set_triangle(struct triangulation *c, uint32_t triangle)
 {
-	const uint32_t *v = &c->m->triangle[3 * (size_t)triangle];
+	const uint32_t *v = &c->m->triangle.corner[3 * (size_t)triangle];
 	double n[3], d[3];
 
 	c->triangle = triangle;
@@ -23,7 +23,7 @@ void set_triangle(struct cutter *c, uint32_t triangle)
 }
 
 /* Half-edge h becomes what `s` says, and the one across it knows. */
-static void set_half(struct cutter *c, uint32_t h, struct half s)
+static void set_half(struct triangulation *c, uint32_t h, struct half s)
 {
 	struct piece *p = piece_of(c, h);
 
@@ -35,14 +35,14 @@ static void set_half(struct cutter *c, uint32_t h, struct half s)
 }
 
 /* Half-edges h and g become the two sides of a new edge. */
-static void join_halves(struct cutter *c, uint32_t h, uint32_t g)
+static void join_halves(struct triangulation *c, uint32_t h, uint32_t g)
 {
 	set_half(c, h, (struct half){ g, RIM, 0 });
 	set_half(c, g, (struct half){ h, RIM, 0 });
 }
 
 /* A copy of piece i as a further part of the same triangle: *j = its number. */
-static int copy_piece(struct cutter *c, uint32_t i, uint32_t *j)
+static int copy_piece(struct triangulation *c, uint32_t i, uint32_t *j)
 {
 	struct piece new = ((struct piece *)c->p->piece.data)[i];
 
@@ -50,23 +50,23 @@ static int copy_piece(struct cutter *c, uint32_t i, uint32_t *j)
 	if (*j >= PIECES_MAX)
 		return err_set(c->e, "more than %d triangles after cutting them where others touch "
 		               "them; use --no-imprint", PIECES_MAX);
-	if (vec_append(&c->p->piece, &new, 1, sizeof new, c->e))
+	if (mem_append(&c->p->piece, &new, 1, sizeof new, c->e))
 		return -1;
 	((struct piece *)c->p->piece.data)[i].next = *j;
 	return 0;
 }
 
-int add_vertex(struct cutter *c, const double x[3], uint32_t *vertex)
+int mesh_add_vertex(struct triangulation *c, const double x[3], uint32_t *vertex)
 {
 	double at[3] = { x[0], x[1], x[2] }; /* x may lie in the array that grows */
 
 	*vertex = (uint32_t)c->p->vertex.n;
-	return vec_append(&c->p->vertex, at, 1, sizeof at, c->e);
+	return mem_append(&c->p->vertex, at, 1, sizeof at, c->e);
 }
 
 /* Halves the piece of h at a vertex on h: h keeps the first half, *second becomes the
  * other. What is across them is left to the caller. */
-static int halve_piece(struct cutter *c, uint32_t h, uint32_t vertex, uint32_t *second)
+static int halve_piece(struct triangulation *c, uint32_t h, uint32_t vertex, uint32_t *second)
 {
 	uint32_t i = h / 3, j, k = h % 3;
 
@@ -81,7 +81,7 @@ static int halve_piece(struct cutter *c, uint32_t h, uint32_t vertex, uint32_t *
 }
 
 /* The half-edge between two vertices, either way, of a part of an input triangle. */
-static uint32_t find_half(const struct cutter *c, uint32_t triangle, uint32_t a, uint32_t b)
+static uint32_t find_half(const struct triangulation *c, uint32_t triangle, uint32_t a, uint32_t b)
 {
 	for (uint32_t i = triangle; i != RIM; i = piece_of(c, 3 * i)->next)
 		for (uint32_t h = 3 * i; h < 3 * i + 3; h++) {
@@ -92,8 +92,8 @@ static uint32_t find_half(const struct cutter *c, uint32_t triangle, uint32_t a,
 	return RIM;
 }
 
-int along_rim(struct cutter *c, uint32_t h, uint32_t vertex,
-              int (*change)(struct cutter *, uint32_t, uint32_t))
+int mesh_along_rim(struct triangulation *c, uint32_t h, uint32_t vertex,
+                   int (*change)(struct triangulation *, uint32_t, uint32_t))
 {
 	uint32_t a = from(c, h), b = from(c, following(h)), edge = get_half(c, h).rim;
 
@@ -105,19 +105,19 @@ int along_rim(struct cutter *c, uint32_t h, uint32_t vertex,
 	return 0;
 }
 
-static int halve_on_rim(struct cutter *c, uint32_t h, uint32_t vertex)
+static int halve_on_rim(struct triangulation *c, uint32_t h, uint32_t vertex)
 {
 	uint32_t second;
 
 	return halve_piece(c, h, vertex, &second);
 }
 
-int halve_edge(struct cutter *c, uint32_t h, uint32_t vertex)
+int mesh_halve_edge(struct triangulation *c, uint32_t h, uint32_t vertex)
 {
 	uint32_t across = get_half(c, h).across, second, other;
 
 	if (across == RIM)
-		return along_rim(c, h, vertex, halve_on_rim);
+		return mesh_along_rim(c, h, vertex, halve_on_rim);
 	if (halve_piece(c, h, vertex, &second) || halve_piece(c, across, vertex, &other))
 		return -1;
 	piece_of(c, h)->across[h % 3] = other;
@@ -127,17 +127,17 @@ int halve_edge(struct cutter *c, uint32_t h, uint32_t vertex)
 	return 0;
 }
 
-int halve_middle(struct cutter *c, uint32_t h)
+int mesh_halve_middle(struct triangulation *c, uint32_t h)
 {
 	double middle[3], edge[3];
 	uint32_t vertex;
 
 	v3_sub(place(c, from(c, following(h))), place(c, from(c, h)), edge);
 	v3_mad(place(c, from(c, h)), .5, edge, middle);
-	return add_vertex(c, middle, &vertex) || halve_edge(c, h, vertex) ? -1 : 0;
+	return mesh_add_vertex(c, middle, &vertex) || mesh_halve_edge(c, h, vertex) ? -1 : 0;
 }
 
-int halve_face(struct cutter *c, uint32_t i, uint32_t vertex)
+int mesh_halve_face(struct triangulation *c, uint32_t i, uint32_t vertex)
 {
 	uint32_t j, l;
 
@@ -154,7 +154,7 @@ int halve_face(struct cutter *c, uint32_t i, uint32_t vertex)
 	return 0;
 }
 
-void flip_edge(struct cutter *c, uint32_t h)
+void mesh_flip_edge(struct triangulation *c, uint32_t h)
 {
 	uint32_t g = get_half(c, h).across;
 	uint32_t h1 = following(h), h2 = preceding(h), g1 = following(g), g2 = preceding(g);
@@ -172,7 +172,7 @@ void flip_edge(struct cutter *c, uint32_t h)
 	set_half(c, g2, a_d);
 }
 
-int may_flip(const struct cutter *c, uint32_t h)
+int mesh_may_flip(const struct triangulation *c, uint32_t h)
 {
 	struct half s = get_half(c, h);
 
@@ -185,7 +185,7 @@ int may_flip(const struct cutter *c, uint32_t h)
 }
 
 /* Cotangent of the angle opposite to h. */
-static double cotangent(const struct cutter *c, uint32_t h)
+static double cotangent(const struct triangulation *c, uint32_t h)
 {
 	struct point x = flat_vertex(c, from(c, preceding(h)));
 	struct point a = flat_vertex(c, from(c, h)), b = flat_vertex(c, from(c, following(h)));
@@ -193,7 +193,7 @@ static double cotangent(const struct cutter *c, uint32_t h)
 	return ((a.x - x.x) * (b.x - x.x) + (a.y - x.y) * (b.y - x.y)) / turn(x, a, b);
 }
 
-void flip_edges(struct cutter *c)
+void mesh_flip_edges(struct triangulation *c)
 {
 	int changed = 1;
 
@@ -201,9 +201,9 @@ void flip_edges(struct cutter *c)
 		changed = 0;
 		for (uint32_t i = c->triangle; i != RIM; i = piece_of(c, 3 * i)->next)
 			for (uint32_t h = 3 * i; h < 3 * i + 3; h++)
-				if (may_flip(c, h) &&
+				if (mesh_may_flip(c, h) &&
 				    cotangent(c, h) + cotangent(c, get_half(c, h).across) < -1e-6) {
-					flip_edge(c, h);
+					mesh_flip_edge(c, h);
 					changed = 1;
 				}
 	}

@@ -30,7 +30,7 @@ struct direct {
 	const struct ray_scene *rays;
 	double centre[3];
 	struct emitters emitters;
-	struct body_set bodies;
+	struct occluder_set bodies;
 	int exact;                    /* emitters are looked at one by one */
 };
 
@@ -50,14 +50,14 @@ struct direct_worker {
 	struct outlook *outlook;      /* [emitters, or EXACT_MOST at most] */
 	size_t outlooks;
 	double *weight;               /* [emitters] cumulated, of sampled ones */
-	struct seer seer;
-	struct sight_line sight;
+	struct visible_point visible;
+	struct shaft shaft;
 	uint64_t rays;
 };
 
 /* ---- what all points share ---- */
 
-struct direct *direct_new(const struct model *m, const struct ray_scene *rays, struct err *e)
+struct direct *occ_direct_new(const struct model *m, const struct ray_scene *rays, struct err *e)
 {
 	struct direct *d = mem_new(1, sizeof *d, "direct light", e);
 
@@ -65,25 +65,25 @@ struct direct *direct_new(const struct model *m, const struct ray_scene *rays, s
 		return NULL;
 	d->m = m;
 	d->rays = rays;
-	facet_centre(m, d->centre);
-	int bad = emitters_init(&d->emitters, m, e);
+	occ_facet_centre(m, d->centre);
+	int bad = occ_emitters_init(&d->emitters, m, e);
 	d->exact = d->emitters.n <= EXACT_MOST;
-	if (!bad && (!d->exact || !body_set_init(&d->bodies, m, e)))
+	if (!bad && (!d->exact || !occ_occluder_set_init(&d->bodies, m, e)))
 		return d;
-	direct_free(d);
+	occ_direct_free(d);
 	return NULL;
 }
 
-void direct_free(struct direct *d)
+void occ_direct_free(struct direct *d)
 {
 	if (!d)
 		return;
-	emitters_free(&d->emitters);
-	body_set_free(&d->bodies);
+	occ_emitters_free(&d->emitters);
+	occ_occluder_set_free(&d->bodies);
 	free(d);
 }
 
-struct direct_worker *direct_worker_new(const struct direct *d, struct err *e)
+struct direct_worker *occ_direct_worker_new(const struct direct *d, struct err *e)
 {
 	struct direct_worker *w = mem_new(1, sizeof *w, "direct light", e);
 
@@ -95,11 +95,11 @@ struct direct_worker *direct_worker_new(const struct direct *d, struct err *e)
 	w->weight = mem_new(d->emitters.n, sizeof *w->weight, "direct light", e);
 	if (w->outlook && w->weight)
 		return w;
-	direct_worker_free(w);
+	occ_direct_worker_free(w);
 	return NULL;
 }
 
-void direct_worker_free(struct direct_worker *w)
+void occ_direct_worker_free(struct direct_worker *w)
 {
 	if (!w)
 		return;
@@ -108,12 +108,12 @@ void direct_worker_free(struct direct_worker *w)
 	free(w);
 }
 
-int direct_exact(const struct direct *d)
+int occ_direct_exact(const struct direct *d)
 {
 	return d->exact;
 }
 
-uint64_t direct_rays(const struct direct_worker *w)
+uint64_t occ_direct_rays(const struct direct_worker *w)
 {
 	return w->rays;
 }
@@ -127,21 +127,21 @@ static const struct facet *front_part(const struct facet *f, const struct facet 
 {
 	double lowest, highest;
 
-	facet_heights(f, of->normal, of->offset, &lowest, &highest);
+	geo_facet_heights(f, of->normal, of->offset, &lowest, &highest);
 	if (highest <= near)
 		return NULL;
 	if (lowest >= -near)
 		return f;
-	return facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
+	return geo_facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
 }
 
 /* Puts the sight line's bodies behind those that the seer has. 0 if there is no room. */
 static int put_blockers(struct direct_worker *w, int *used, struct outlook *o)
 {
-	if (*used + w->sight.bodies > SIGHT_BLOCKERS)
+	if (*used + w->shaft.bodies > SHAFT_OCCLUDERS)
 		return 0;
-	for (int i = 0; i < w->sight.bodies; i++)
-		if (blocker_make(&w->d->bodies, w->sight.body[i], o->f, &w->seer.blocker[*used]))
+	for (int i = 0; i < w->shaft.bodies; i++)
+		if (occ_occluder_make(&w->d->bodies, w->shaft.body[i], o->f, &w->visible.occluder[*used]))
 			o->blockers |= (uint64_t)1 << (*used)++;
 	return 1;
 }
@@ -160,26 +160,26 @@ static int look(struct direct_worker *w, const struct facet *f, const struct emi
 	o->f = from ? front_part(&t->f, f, d->bodies.near, &o->room) : NULL;
 	if (!o->f)
 		return 0;
-	w->sight.most = BLOCKERS_MOST;
-	enum sight sight = sight_find(&w->sight, &d->bodies, from, o->f);
-	o->sampled = sight == SIGHT_CROWDED || (sight == SIGHT_PART && !put_blockers(w, used, o));
-	return sight != SIGHT_NONE;
+	w->shaft.most = BLOCKERS_MOST;
+	enum shaft_state sight = occ_shaft_cull(&w->shaft, &d->bodies, from, o->f);
+	o->sampled = sight == SHAFT_CROWDED || (sight == SHAFT_PARTLY && !put_blockers(w, used, o));
+	return sight != SHAFT_HIDDEN;
 }
 
 /* The element as a facet whose front is the side. */
 static struct facet side_facet(const struct direct *d, uint32_t element_side, double corner[9])
 {
 	struct facet f = { .n = 3, .v = corner };
-	const uint32_t *c = &d->m->element[3 * (size_t)(element_side >> 1)];
+	const uint32_t *c = &d->m->element.corner[3 * (size_t)(element_side >> 1)];
 
 	for (int k = 0; k < 3; k++)
 		v3_sub(&d->m->vertex[3 * (size_t)c[element_side & 1 ? 2 - k : k]], d->centre,
 		       &corner[3 * k]);
-	facet_measure(&f);
+	geo_facet_measure(&f);
 	return f;
 }
 
-void direct_begin(struct direct_worker *w, uint32_t element_side)
+void occ_direct_begin(struct direct_worker *w, uint32_t element_side)
 {
 	const struct direct *d = w->d;
 	double corner[9];
@@ -194,7 +194,7 @@ void direct_begin(struct direct_worker *w, uint32_t element_side)
 	for (size_t i = 0; i < d->emitters.n && d->exact; i++)
 		w->outlooks += (size_t)look(w, &f, &d->emitters.emitter[i], &used,
 		                            &w->outlook[w->outlooks]);
-	seer_begin(&w->seer, used, d->bodies.near);
+	occ_visible_begin(&w->visible, used, d->bodies.near);
 }
 
 /* ---- by formula ---- */
@@ -230,14 +230,14 @@ static double weighted_part(const struct emitter *t, const double x[3], const st
 		return 0;
 	/* Close to x, parts are as small as what is near them no longer matters. */
 	if (depth < (far < f->radius ? DEEPEST / 4 : DEEPEST) && small * far < f->radius &&
-	    facet_quarter(f, quarter)) {
+	    geo_facet_quarter(f, quarter)) {
 		for (int i = 0; i < 4; i++)
 			sum += weighted_part(t, x, &quarter[i].f, weight, depth + 1);
 		return sum;
 	}
 	double at[4][ROOM];
 	struct cubature p = { 0, at[0], at[1], at[2], at[3] };
-	cubature_fill(f, 1, &p);
+	geo_cubature_fill(f, 1, &p);
 	for (int i = 0; i < p.n; i++) {
 		double y[3] = { p.x[i], p.y[i], p.z[i] };
 		v3_sub(y, x, d);
@@ -255,7 +255,7 @@ struct weighted_eye {
 };
 
 /* The same over a polygon as x sees it: a fan of triangles. */
-static double weighted_polygon(const struct eye_polygon *p, void *arg)
+static double weighted_polygon(const struct point_polygon *p, void *arg)
 {
 	const struct weighted_eye *o = arg;
 	double sum = 0;
@@ -269,7 +269,7 @@ static double weighted_polygon(const struct eye_polygon *p, void *arg)
 			corner[3 * i + 1] = o->x[1] + p->y[c];
 			corner[3 * i + 2] = o->x[2] + p->z[c];
 		}
-		facet_measure(&f);
+		geo_facet_measure(&f);
 		if (f.area > 0)
 			sum += weighted_part(o->t, o->x, &f, o->weight, 0);
 	}
@@ -284,11 +284,11 @@ static double weighted(struct direct_worker *w, const struct outlook *o, const d
 
 	if (v3_dot(o->emitter->f.normal, x) - o->emitter->f.offset <= 0)
 		return 0;
-	return seen_measured(&w->seer, x, o->f, o->blockers, weighted_polygon, &eye, e);
+	return occ_visible_integrate(&w->visible, x, o->f, o->blockers, weighted_polygon, &eye, e);
 }
 
-int direct_weighted(struct direct_worker *w, const double world[3],
-                    const struct direct_weight *weight, double *h, struct err *e)
+int occ_direct_weighted(struct direct_worker *w, const double world[3],
+                        const struct direct_weight *weight, double *h, struct err *e)
 {
 	double x[3];
 
@@ -304,7 +304,7 @@ int direct_weighted(struct direct_worker *w, const double world[3],
 	return 0;
 }
 
-int direct_sampled(const struct direct_worker *w)
+int occ_direct_sampled(const struct direct_worker *w)
 {
 	int sampled = !w->d->exact;
 
@@ -327,9 +327,9 @@ static double exact(struct direct_worker *w, const struct outlook *o, const doub
 	if (v3_dot(t->f.normal, x) - t->f.offset <= 0)
 		return 0;
 	if (!o->blockers && t->exponent == 1)
-		return PI * fmax(0, contour_point(x, w->normal, o->f->n, o->f->v));
+		return PI * fmax(0, geo_contour_point(x, w->normal, o->f->n, o->f->v));
 	if (t->exponent == 1)
-		return PI * seen(&w->seer, x, w->normal, o->f, o->blockers, e);
+		return PI * occ_visible_exchange(&w->visible, x, w->normal, o->f, o->blockers, e);
 	struct direct_weight all = { .at = cosine, .arg = w->normal, .width = 1, .reach = PI };
 	memcpy(all.axis, w->normal, sizeof all.axis);
 	return weighted(w, o, x, &all, e);
@@ -344,7 +344,7 @@ static double guess(const struct direct_worker *w, const struct emitter *t, cons
 	double d[3], lowest, highest, offset = v3_dot(w->normal, x);
 	double there = v3_dot(t->f.normal, x) - t->f.offset;
 
-	facet_heights(&t->f, w->normal, offset, &lowest, &highest);
+	geo_facet_heights(&t->f, w->normal, offset, &lowest, &highest);
 	if (highest <= 0 || there <= 0)
 		return 0;
 	v3_sub(t->f.centre, x, d);
@@ -381,7 +381,7 @@ static void add_ray(struct direct_worker *w, const double x[3], size_t n, const 
 	}
 	const struct emitter *t = d->exact ? w->outlook[lo].emitter : &d->emitters.emitter[lo];
 	double share = (w->weight[lo] - (lo ? w->weight[lo - 1] : 0)) / total;
-	facet_point(&t->f, u[1], u[2], y);
+	geo_facet_point(&t->f, u[1], u[2], y);
 	v3_sub(y, x, v);
 	double r2 = v3_dot(v, v), r = sqrt(r2);
 	double here = v3_dot(v, w->normal) / r, there = -v3_dot(v, t->f.normal) / r;
@@ -455,7 +455,7 @@ static void add_lights(struct direct_worker *w, const double world[3], double *h
 	ray_leave(w->d->rays, w->normal, from);
 	for (size_t i = 0; i < m->light.n; i++) {
 		struct light_sight s;
-		light_see(&m->light, i, world, ray_offset(w->d->rays), &s);
+		model_light_see(&m->light, i, world, ray_offset(w->d->rays), &s);
 		double scale = v3_dot(w->normal, s.toward) * s.across * s.falloff;
 		if (!(scale > 0))
 			continue;
@@ -467,8 +467,8 @@ static void add_lights(struct direct_worker *w, const double world[3], double *h
 	}
 }
 
-int direct_at(struct direct_worker *w, const double world[3], uint64_t seed, double relative,
-              const double *other, double *h, double *error, struct err *e)
+int occ_direct_at(struct direct_worker *w, const double world[3], uint64_t seed, double relative,
+                  const double *other, double *h, double *error, struct err *e)
 {
 	const struct direct *d = w->d;
 	size_t n = d->exact ? w->outlooks : d->emitters.n;

@@ -22,15 +22,15 @@ struct direct;
 struct direct_worker;
 
 /* m and rays must outlive it. O(triangles log triangles). NULL and e on failure. */
-struct direct *direct_new(const struct model *m, const struct ray_scene *rays, struct err *e);
-void direct_free(struct direct *d);
+struct direct *occ_direct_new(const struct model *m, const struct ray_scene *rays, struct err *e);
+void occ_direct_free(struct direct *d);
 
-struct direct_worker *direct_worker_new(const struct direct *d, struct err *e);
-void direct_worker_free(struct direct_worker *w);
+struct direct_worker *occ_direct_worker_new(const struct direct *d, struct err *e);
+void occ_direct_worker_free(struct direct_worker *w);
 
-/* Makes the side the one that the points of direct_at are on; free if it already was.
+/* Makes the side the one that the points of occ_direct_at are on; free if it already was.
  * O(emitters x bodies near the lines between). */
-void direct_begin(struct direct_worker *w, uint32_t element_side);
+void occ_direct_begin(struct direct_worker *w, uint32_t element_side);
 
 /* Irradiance of the side at a point x (world) of its element from all emitters and lights, into
  * h[bands], and its standard error into error[bands] (0 where it is exact). Shadow rays
@@ -38,8 +38,8 @@ void direct_begin(struct direct_worker *w, uint32_t element_side);
  * point has beside, other[bands], within limits. The result depends on nothing else. 0, or
  * -1 and e when memory is short.
  * O(emitters x bodies between + lights). */
-int direct_at(struct direct_worker *w, const double x[3], uint64_t seed, double relative,
-              const double *other, double *h, double *error, struct err *e);
+int occ_direct_at(struct direct_worker *w, const double x[3], uint64_t seed, double relative,
+                  const double *other, double *h, double *error, struct err *e);
 
 /* A weight of directions: at(unit direction, arg), which is smooth over angles of `width` and
  * nothing to speak of beyond the angle `reach` from the unit vector `axis`. */
@@ -49,19 +49,19 @@ struct direct_weight {
 	double axis[3], width, reach;
 };
 
-/* 1 if the side of direct_begin has to sample some emitter. */
-int direct_sampled(const struct direct_worker *w);
+/* 1 if the side of occ_direct_begin has to sample some emitter. */
+int occ_direct_sampled(const struct direct_worker *w);
 
 /* The radiance that a point of a side that samples none gets straight from emitters,
  * integrated over directions with a weight, into h[bands]. Punctual lights have none. 0, or
  * -1 and e when memory is short. O(emitters x bodies between). */
-int direct_weighted(struct direct_worker *w, const double x[3], const struct direct_weight *weight,
-                    double *h, struct err *e);
+int occ_direct_weighted(struct direct_worker *w, const double x[3], const struct direct_weight *weight,
+                        double *h, struct err *e);
 
 /* 1 if emitters are few enough to be looked at one by one. */
-int direct_exact(const struct direct *d);
+int occ_direct_exact(const struct direct *d);
 
 /* Shadow rays traced so far. */
-uint64_t direct_rays(const struct direct_worker *w);
+uint64_t occ_direct_rays(const struct direct_worker *w);
 
 #endif

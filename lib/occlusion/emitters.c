@@ -21,16 +21,16 @@ static int put_facet(struct maker *k, const struct polygons *p, const uint32_t *
                      size_t material, int side)
 {
 	const struct materials *mt = &k->m->material;
-	struct emitter t = { .f.n = n, .radiance = &mt->emission[material_at(mt, material, side)],
+	struct emitter t = { .f.n = n, .radiance = &mt->emission[model_material_at(mt, material, side)],
 	                     .exponent = mt->emission_exponent[2 * material + (size_t)side] };
 	double x[3];
 
 	for (int i = 0; i < n; i++) {
-		v3_mad(polygon_point(p, corner[side == BACK ? n - 1 - i : i]), 1, k->shift, x);
-		if (vec_append(&k->corner, x, 3, sizeof *x, k->e))
+		v3_mad(occ_polygon_point(p, corner[side == BACK ? n - 1 - i : i]), 1, k->shift, x);
+		if (mem_append(&k->corner, x, 3, sizeof *x, k->e))
 			return -1;
 	}
-	return vec_append(&k->emitter, &t, 1, sizeof t, k->e);
+	return mem_append(&k->emitter, &t, 1, sizeof t, k->e);
 }
 
 static int put_polygon(struct maker *k, const struct polygons *p, const struct polygon *q,
@@ -55,27 +55,27 @@ static int put_material(struct maker *k, size_t material, uint32_t *triangle, ui
 	struct polygons p = { 0 };
 	double centre[3], own[3];
 
-	sub.triangles = 0;
-	sub.triangle = triangle;
-	sub.triangle_surface = surface;
-	for (size_t i = 0; i < m->triangles; i++) {
-		if (m->surface.material[m->triangle_surface[i]] != material)
+	sub.triangle.n = 0;
+	sub.triangle.corner = triangle;
+	sub.triangle.surface = surface;
+	for (size_t i = 0; i < m->triangle.n; i++) {
+		if (m->surface.material[m->triangle.surface[i]] != material)
 			continue;
-		memcpy(&triangle[3 * sub.triangles], &m->triangle[3 * i], 3 * sizeof *triangle);
-		surface[sub.triangles++] = m->triangle_surface[i];
+		memcpy(&triangle[3 * sub.triangle.n], &m->triangle.corner[3 * i], 3 * sizeof *triangle);
+		surface[sub.triangle.n++] = m->triangle.surface[i];
 	}
-	if (sub.triangles == 0)
+	if (sub.triangle.n == 0)
 		return 0;
-	facet_centre(m, centre);
-	facet_centre(&sub, own);
+	occ_facet_centre(m, centre);
+	occ_facet_centre(&sub, own);
 	v3_sub(own, centre, k->shift);
-	int bad = polygons_init(&p, &sub, k->e);
+	int bad = occ_polygons_init(&p, &sub, k->e);
 	for (size_t i = 0; !bad && i < p.polygon.n; i++)
 		for (int side = FRONT; side <= BACK && !bad; side++)
 			if (bsdf_emits(&m->material, material, side))
 				bad = put_polygon(k, &p, (const struct polygon *)p.polygon.data + i, material,
 				                  side);
-	polygons_free(&p);
+	occ_polygons_free(&p);
 	return bad;
 }
 
@@ -87,17 +87,17 @@ static void measure(struct emitters *s, const struct maker *k)
 		struct emitter *t = &s->emitter[i];
 		t->f.v = s->corner + at;
 		at += 3 * (size_t)t->f.n;
-		facet_measure(&t->f);
+		geo_facet_measure(&t->f);
 		for (int b = 0; b < k->m->bands; b++)
 			t->power += t->radiance[b] / k->m->bands * t->f.area;
 	}
 }
 
-int emitters_init(struct emitters *s, const struct model *m, struct err *e)
+int occ_emitters_init(struct emitters *s, const struct model *m, struct err *e)
 {
 	struct maker k = { .m = m, .e = e };
-	uint32_t *triangle = mem_new(m->triangles, 3 * sizeof *triangle, "emitters", e);
-	uint32_t *surface = mem_new(m->triangles, sizeof *surface, "emitters", e);
+	uint32_t *triangle = mem_new(m->triangle.n, 3 * sizeof *triangle, "emitters", e);
+	uint32_t *surface = mem_new(m->triangle.n, sizeof *surface, "emitters", e);
 	int bad = !triangle || !surface;
 
 	for (size_t i = 0; i < m->material.n && !bad; i++)
@@ -111,7 +111,7 @@ int emitters_init(struct emitters *s, const struct model *m, struct err *e)
 	return bad ? -1 : 0;
 }
 
-void emitters_free(struct emitters *s)
+void occ_emitters_free(struct emitters *s)
 {
 	free(s->emitter);
 	free(s->corner);

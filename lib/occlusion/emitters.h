@@ -11,7 +11,7 @@
 #include "lib/geometry/facet.h"
 
 struct emitter {
-	struct facet f;               /* its front sends; corners relative to facet_centre() */
+	struct facet f;               /* its front sends; corners relative to occ_facet_centre() */
 	const double *radiance;       /* [bands] along the normal */
 	double exponent;              /* m of L cos^(m-1) */
 	double power;                 /* mean over bands of radiance, times area */
@@ -25,7 +25,7 @@ struct emitters {
 
 /* m must outlive it. O(materials that emit x triangles). 0, or -1 and e; to be freed in
  * any case. */
-int emitters_init(struct emitters *s, const struct model *m, struct err *e);
-void emitters_free(struct emitters *s);
+int occ_emitters_init(struct emitters *s, const struct model *m, struct err *e);
+void occ_emitters_free(struct emitters *s);
 
 #endif

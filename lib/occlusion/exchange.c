@@ -7,18 +7,18 @@
 
 enum { CROWD_PARTS = 4 };
 
-void exchanger_init(struct exchanger *x, const struct exchange_options *o,
-                    const struct body_set *bodies, struct ray_scene *rays,
-                    const double centre[3])
+void occ_exchanger_init(struct exchanger *x, const struct exchange_options *o,
+                        const struct occluder_set *bodies, struct ray_scene *rays,
+                        const double centre[3])
 {
 	*x = (struct exchanger){ .o = *o, .bodies = bodies, .rays = rays, .centre = centre };
-	x->sight.most = o->bodies < SIGHT_BLOCKERS ? o->bodies : SIGHT_BLOCKERS;
-	clear_init(&x->clear, o->relative);
+	x->shaft.most = o->bodies < SHAFT_OCCLUDERS ? o->bodies : SHAFT_OCCLUDERS;
+	geo_unoccluded_init(&x->clear, o->relative);
 }
 
-void exchanger_free(struct exchanger *x)
+void occ_exchanger_free(struct exchanger *x)
 {
-	occluded_free(&x->occluded);
+	occ_occluded_free(&x->occluded);
 }
 
 /* ---- too many bodies between: rays between points of both ---- */
@@ -35,8 +35,8 @@ static double crowded(struct exchanger *x, const struct facet *a, const struct f
 			double u[4], y[3], z[3], d[3];
 			for (int k = 0; k < 4; k++)
 				u[k] = rng_sobol(i, k, seed + p);
-			facet_point(a, u[0], u[1], y);
-			facet_point(b, u[2], u[3], z);
+			geo_facet_point(a, u[0], u[1], y);
+			geo_facet_point(b, u[2], u[3], z);
 			v3_sub(z, y, d);
 			double r2 = v3_dot(d, d);
 			double w = fmax(0, v3_dot(d, a->normal)) * fmax(0, -v3_dot(d, b->normal)) / (r2 * r2);
@@ -61,7 +61,7 @@ static double crowded(struct exchanger *x, const struct facet *a, const struct f
 /* The part of a facet in front of another's plane. NULL if there is none; *points are
  * dropped where the facet is cut. */
 static const struct facet *front_part(const struct facet *f, const struct facet *of, double near,
-                                      struct facet_room *room, struct clear_points *points)
+                                      struct facet_room *room, struct unoccluded_points *points)
 {
 	double lowest, highest, h = v3_dot(of->normal, f->centre) - of->offset;
 
@@ -69,13 +69,13 @@ static const struct facet *front_part(const struct facet *f, const struct facet 
 		return f;
 	if (h <= -f->radius)
 		return NULL;
-	facet_heights(f, of->normal, of->offset, &lowest, &highest);
+	geo_facet_heights(f, of->normal, of->offset, &lowest, &highest);
 	if (highest <= near)
 		return NULL;
 	if (lowest >= -near)
 		return f;
-	*points = (struct clear_points){ NULL, NULL };
-	return facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
+	*points = (struct unoccluded_points){ NULL, NULL };
+	return geo_facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
 }
 
 /* Can nothing be between, and is each wholly in front of the other? What most pairs of a
@@ -86,10 +86,10 @@ static int plainly_clear(const struct exchanger *x, const struct facet *a, const
 	       v3_dot(a->normal, b->centre) - a->offset >= b->radius;
 }
 
-static double clear_pair(struct exchanger *x, const struct facet *a, struct clear_points pa,
-                         const struct facet *b, struct clear_points pb, double *error)
+static double clear_pair(struct exchanger *x, const struct facet *a, struct unoccluded_points pa,
+                         const struct facet *b, struct unoccluded_points pb, double *error)
 {
-	double clear = clear_exchange(&x->clear, a, pa, b, pb);
+	double clear = geo_unoccluded_exchange(&x->clear, a, pa, b, pb);
 
 	*error = x->o.relative * clear;
 	x->counts.clear++;
@@ -99,8 +99,8 @@ static double clear_pair(struct exchanger *x, const struct facet *a, struct clea
 static double any_pair(struct exchanger *x, const struct facet_set *sa, uint32_t i,
                        const struct facet_set *sb, uint32_t j, double *error, struct err *e)
 {
-	struct clear_points pa = { sa->stored[i], &sa->joint[i] };
-	struct clear_points pb = { sb->stored[j], &sb->joint[j] };
+	struct unoccluded_points pa = { sa->stored[i], &sa->joint[i] };
+	struct unoccluded_points pb = { sb->stored[j], &sb->joint[j] };
 	struct facet_room room[2];
 	double near = x->bodies->near;
 	const struct facet *fa = &sa->facet[i], *fb = &sb->facet[j];
@@ -111,38 +111,38 @@ static double any_pair(struct exchanger *x, const struct facet_set *sa, uint32_t
 	if (!b)
 		return 0;
 	x->counts.pairs++;
-	enum sight sight = sight_find(&x->sight, x->bodies, a, b);
-	if (sight == SIGHT_NONE) {
+	enum shaft_state sight = occ_shaft_cull(&x->shaft, x->bodies, a, b);
+	if (sight == SHAFT_HIDDEN) {
 		x->counts.hidden++;
 		return 0;
 	}
-	if (sight == SIGHT_PART) {
-		double before = x->occluded.seer.evaluations;
+	if (sight == SHAFT_PARTLY) {
+		double before = x->occluded.visible.evaluations;
 		double tolerance = x->o.absolute * fmin(fa->area, fb->area);
-		double sum = occluded_exchange(&x->occluded, &x->clear, &x->sight, tolerance, x->o.most, error, e);
+		double sum = occ_occluded_exchange(&x->occluded, &x->clear, &x->shaft, tolerance, x->o.most, error, e);
 		x->counts.partly++;
-		x->counts.evaluations += x->occluded.seer.evaluations - before;
+		x->counts.evaluations += x->occluded.visible.evaluations - before;
 		return sum;
 	}
-	if (sight == SIGHT_CROWDED && !x->o.crowd_rays) {
+	if (sight == SHAFT_CROWDED && !x->o.crowd_rays) {
 		x->counts.crowded++;
 		return 0;
 	}
-	if (sight == SIGHT_CLEAR)
+	if (sight == SHAFT_CLEAR)
 		return clear_pair(x, a, pa, b, pb, error);
-	double clear = clear_exchange(&x->clear, a, pa, b, pb);
+	double clear = geo_unoccluded_exchange(&x->clear, a, pa, b, pb);
 	x->counts.crowded++;
 	return crowded(x, a, b, clear, ((uint64_t)i << 32) ^ j, error);
 }
 
-double exchange(struct exchanger *x, const struct facet_set *sa, uint32_t i,
-                const struct facet_set *sb, uint32_t j, double *error, struct err *e)
+double occ_exchange(struct exchanger *x, const struct facet_set *sa, uint32_t i,
+                    const struct facet_set *sb, uint32_t j, double *error, struct err *e)
 {
 	const struct facet *a = &sa->facet[i], *b = &sb->facet[j];
 
 	if (!plainly_clear(x, a, b))
 		return any_pair(x, sa, i, sb, j, error, e);
 	x->counts.pairs++;
-	return clear_pair(x, a, (struct clear_points){ sa->stored[i], &sa->joint[i] },
-	                  b, (struct clear_points){ sb->stored[j], &sb->joint[j] }, error);
+	return clear_pair(x, a, (struct unoccluded_points){ sa->stored[i], &sa->joint[i] },
+	                  b, (struct unoccluded_points){ sb->stored[j], &sb->joint[j] }, error);
 }

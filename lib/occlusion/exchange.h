@@ -25,23 +25,23 @@ struct exchange_counts {
 /* One thread's scratch space. */
 struct exchanger {
 	struct exchange_options o;
-	const struct body_set *bodies;
+	const struct occluder_set *bodies;
 	struct ray_scene *rays;               /* for crowded pairs */
 	const double *centre;                 /* what facets are relative to */
-	struct clear clear;
-	struct sight_line sight;
+	struct unoccluded clear;
+	struct shaft shaft;
 	struct occluded occluded;
 	struct exchange_counts counts;
 };
 
-void exchanger_init(struct exchanger *x, const struct exchange_options *o,
-                    const struct body_set *bodies, struct ray_scene *rays,
-                    const double centre[3]);
-void exchanger_free(struct exchanger *x);
+void occ_exchanger_init(struct exchanger *x, const struct exchange_options *o,
+                        const struct occluder_set *bodies, struct ray_scene *rays,
+                        const double centre[3]);
+void occ_exchanger_free(struct exchanger *x);
 
 /* Exchange area, m^2, of facets i of a set and j of a set; *error is an estimate of its
  * absolute error. NaN and e when memory is short. */
-double exchange(struct exchanger *x, const struct facet_set *a, uint32_t i,
-                const struct facet_set *b, uint32_t j, double *error, struct err *e);
+double occ_exchange(struct exchanger *x, const struct facet_set *a, uint32_t i,
+                    const struct facet_set *b, uint32_t j, double *error, struct err *e);
 
 #endif

@@ -35,7 +35,7 @@ enum { HALVINGS = 5 };        /* of the facet seen, to prove that several blocke
 /* An integral over facet f of what it sees of g. */
 struct integral {
 	struct occluded *o;
-	struct clear *clear;
+	struct unoccluded *clear;
 	const struct facet *f, *g;
 	double near;
 	struct shadows shadows;
@@ -44,7 +44,7 @@ struct integral {
 	struct err *e;
 };
 
-void occluded_free(struct occluded *o)
+void occ_occluded_free(struct occluded *o)
 {
 	free(o->cell.data);
 	*o = (struct occluded){ 0 };
@@ -66,19 +66,19 @@ static const struct facet *shape_of(struct cell *c)
 }
 
 /* Parts have no points kept. */
-static const struct clear_points none = { NULL, NULL };
+static const struct unoccluded_points none = { NULL, NULL };
 
 /* Settles a cell whose view is clear or hidden: 1. Otherwise narrows its blockers down. */
-static int settle(struct integral *in, struct cell *c, const struct facet *f)
+static int combine_landed(struct integral *in, struct cell *c, const struct facet *f)
 {
 	int hidden;
 
-	c->blockers = shadow_on(in->o->seer.blocker, &in->shadows, c->blockers, f, in->g, in->near,
-	                        &hidden);
+	c->blockers = occ_shadow_on(in->o->visible.occluder, &in->shadows, c->blockers, f, in->g, in->near,
+	                            &hidden);
 	if (hidden)
 		return 1;
 	if (!c->blockers)
-		in->settled += clear_exchange(in->clear, f, none, in->g, none);
+		in->settled += geo_unoccluded_exchange(in->clear, f, none, in->g, none);
 	return !c->blockers;
 }
 
@@ -87,16 +87,16 @@ static void measure(const struct integral *in, struct cell *c, const struct face
 	double x[4][4 * FACET_CORNERS];
 	struct cubature p = { 0, x[0], x[1], x[2], x[3] };
 
-	cubature_fill(f, 0, &p);
+	geo_cubature_fill(f, 0, &p);
 	c->value = 0;
-	in->o->seer.hid = 0;
+	in->o->visible.hid = 0;
 	for (int i = 0; i < p.n; i++) {
 		double at[3] = { p.x[i], p.y[i], p.z[i] };
 		if (p.w[i] > 0)
-			c->value += p.w[i] * seen(&in->o->seer, at, in->f->normal, in->g, c->blockers,
-			                          in->e);
+			c->value += p.w[i] * occ_visible_exchange(&in->o->visible, at, in->f->normal, in->g, c->blockers,
+			                                          in->e);
 	}
-	c->bright = !in->o->seer.hid;
+	c->bright = !in->o->visible.hid;
 }
 
 /* The cut that halves a cell best, of those with a blocker that matters to it; forgets
@@ -111,7 +111,7 @@ static const struct plane *best_cut(const struct integral *in, const struct shad
 		double lowest, highest;
 		if (!(*bits >> i & 1))
 			continue;
-		facet_heights(f, s->cut[i].normal, s->cut[i].offset, &lowest, &highest);
+		geo_facet_heights(f, s->cut[i].normal, s->cut[i].offset, &lowest, &highest);
 		if (lowest >= -in->near || highest <= in->near || !(s->of[i] & c->blockers)) {
 			*bits &= ~((uint32_t)1 << i);
 		} else if (fmin(-lowest, highest) > best * (highest - lowest)) {
@@ -126,7 +126,7 @@ static const struct plane *best_cut(const struct integral *in, const struct shad
  * alone is of second order, theirs of fourth. */
 static double surmise(const struct integral *in, const struct cell *c, const struct facet *f)
 {
-	double one = f->area * seen(&in->o->seer, f->centre, in->f->normal, in->g, c->blockers, in->e);
+	double one = f->area * occ_visible_exchange(&in->o->visible, f->centre, in->f->normal, in->g, c->blockers, in->e);
 	double off = c->value - one, guess = 4 * off * off / c->value;
 
 	return fmin(unproved, fmax(surmised, guess / c->most)) * c->most;
@@ -146,8 +146,8 @@ static double doubt(const struct integral *in, struct cell *c, const struct face
 		return compared ? 0 : surmise(in, c, f);
 	for (int k = 0; k < f->n; k++) {
 		const double *v = &f->v[3 * k];
-		double s = seen(&in->o->seer, v, in->f->normal, in->g, c->blockers, in->e);
-		double all = contour_point(v, in->f->normal, in->g->n, in->g->v);
+		double s = occ_visible_exchange(&in->o->visible, v, in->f->normal, in->g, c->blockers, in->e);
+		double all = geo_contour_point(v, in->f->normal, in->g->n, in->g->v);
 		if (all > 0)
 			off = fmax(off, fmin(1, dark ? s / all : 1 - s / all));
 	}
@@ -166,15 +166,15 @@ static int divide(const struct integral *in, struct cell *c, struct facet_room p
 	if (in->cut && !cut)
 		cut = best_cut(in, &in->shadows.bends, &c->bends, c, f);
 	if (!cut)
-		return facet_quarter(f, part) ? 4 : 0;
-	return facet_split(f, cut->normal, cut->offset, part) ? 2 : 0;
+		return geo_facet_quarter(f, part) ? 4 : 0;
+	return geo_facet_split(f, cut->normal, cut->offset, part) ? 2 : 0;
 }
 
 /* Is it sure that the blockers together hide all from a cell that saw nothing? */
 static int dark(const struct integral *in, const struct cell *c, const struct facet *f)
 {
 	return c->value == 0 &&
-	       blockers_hide(in->o->seer.blocker, c->blockers, f, in->g, in->near, HALVINGS);
+	       occ_occluders_hide(in->o->visible.occluder, c->blockers, f, in->g, in->near, HALVINGS);
 }
 
 /* Replaces a cell by its parts. */
@@ -196,7 +196,7 @@ static int refine(struct integral *in, size_t i)
 		part[left] = (struct cell){ .blockers = c.blockers, .edges = c.edges, .bends = c.bends,
 		                            .most = c.most * f->area / area };
 		set_shape(&part[left], f);
-		if (settle(in, &part[left], f))
+		if (combine_landed(in, &part[left], f))
 			continue;
 		measure(in, &part[left], f);
 		sum += part[left].value;
@@ -211,7 +211,7 @@ static int refine(struct integral *in, size_t i)
 		double least = n == 4 ? c.error / fall : 0;
 		part[k].error = fmax(fmax(off, least), doubt(in, &part[k], shape_of(&part[k]), n == 4));
 	}
-	return vec_append(cells, part, (size_t)left, sizeof *part, in->e);
+	return mem_append(cells, part, (size_t)left, sizeof *part, in->e);
 }
 
 static int put_whole(struct integral *in, uint64_t blockers, double most)
@@ -220,11 +220,11 @@ static int put_whole(struct integral *in, uint64_t blockers, double most)
 	                  .edges = UINT32_MAX, .bends = UINT32_MAX };
 
 	set_shape(&c, in->f);
-	if (settle(in, &c, in->f))
+	if (combine_landed(in, &c, in->f))
 		return 0;
 	measure(in, &c, in->f);
 	c.error = unproved * c.most;
-	return vec_append(&in->o->cell, &c, 1, sizeof c, in->e);
+	return mem_append(&in->o->cell, &c, 1, sizeof c, in->e);
 }
 
 /* ---- the integral ---- */
@@ -232,7 +232,7 @@ static int put_whole(struct integral *in, uint64_t blockers, double most)
 static double integrate(struct integral *in, double tolerance, int most, double *error)
 {
 	struct occluded *o = in->o;
-	double stop = o->seer.evaluations + most;
+	double stop = o->visible.evaluations + most;
 
 	for (;;) {
 		const struct cell *c = o->cell.data;
@@ -245,18 +245,18 @@ static double integrate(struct integral *in, double tolerance, int most, double 
 				worst = i;
 		}
 		*error = off;
-		if (!(off > tolerance) || o->seer.evaluations >= stop)
+		if (!(off > tolerance) || o->visible.evaluations >= stop)
 			return sum;
 		if (refine(in, worst))
 			return NAN;
 	}
 }
 
-static void make_blockers(struct occluded *o, const struct sight_line *l, const struct facet *g)
+static void make_blockers(struct occluded *o, const struct shaft *l, const struct facet *g)
 {
 	o->blockers = 0;
 	for (int i = 0; i < l->bodies; i++)
-		o->blockers += blocker_make(l->set, l->body[i], g, &o->seer.blocker[o->blockers]);
+		o->blockers += occ_occluder_make(l->set, l->body[i], g, &o->visible.occluder[o->blockers]);
 }
 
 /* How near the blockers come to a facet: its points' shadows then change quickly. */
@@ -265,14 +265,14 @@ static double clearance(const struct occluded *o, const struct facet *f)
 	double least = INFINITY;
 
 	for (int i = 0; i < o->blockers; i++)
-		for (int k = 0; k < o->seer.blocker[i].corners; k++)
-			least = fmin(least, fmax(0, v3_dot(f->normal, o->seer.blocker[i].corner[k]) -
+		for (int k = 0; k < o->visible.occluder[i].corners; k++)
+			least = fmin(least, fmax(0, v3_dot(f->normal, o->visible.occluder[i].corner[k]) -
 			                            f->offset));
 	return least;
 }
 
-double occluded_exchange(struct occluded *o, struct clear *clear, const struct sight_line *l,
-                         double tolerance, int most, double *error, struct err *e)
+double occ_occluded_exchange(struct occluded *o, struct unoccluded *clear, const struct shaft *l,
+                             double tolerance, int most, double *error, struct err *e)
 {
 	struct integral in = { .o = o, .clear = clear, .f = l->a, .g = l->b, .near = l->set->near,
 	                       .e = e };
@@ -283,14 +283,14 @@ double occluded_exchange(struct occluded *o, struct clear *clear, const struct s
 		in.g = l->a;
 		make_blockers(o, l, l->a);
 	}
-	seer_begin(&o->seer, o->blockers, in.near);
+	occ_visible_begin(&o->visible, o->blockers, in.near);
 	o->cell.n = 0;
 	uint64_t all = o->blockers ? UINT64_MAX >> (64 - o->blockers) : 0;
 	/* Cutting pays where more is asked for than cells across shadows' edges can tell. */
-	double whole = clear_exchange(clear, in.f, none, in.g, none);
+	double whole = geo_unoccluded_exchange(clear, in.f, none, in.g, none);
 	in.cut = tolerance < 2 * unseen * whole;
 	if (in.cut)
-		shadow_edges(o->seer.blocker, o->blockers, in.f, in.g, in.near, &in.shadows);
+		occ_shadow_edges(o->visible.occluder, o->blockers, in.f, in.g, in.near, &in.shadows);
 	if (put_whole(&in, all & ~in.shadows.idle, whole))
 		return NAN;
 	double seen = integrate(&in, tolerance, most, error);

@@ -8,19 +8,19 @@
 #include "lib/geometry/exchange_unoccluded.h"
 #include "lib/occlusion/visible_region.h"
 
-/* One thread's scratch space; begin with {0}, release with occluded_free. */
+/* One thread's scratch space; begin with {0}, release with occ_occluded_free. */
 struct occluded {
-	struct seer seer;
+	struct visible_point visible;
 	int blockers;
 	struct vec cell;              /* struct cell */
 };
 
-void occluded_free(struct occluded *o);
+void occ_occluded_free(struct occluded *o);
 
-/* Exchange area, m^2, of the facets of a sight line found SIGHT_PART, to an absolute
+/* Exchange area, m^2, of the facets of a sight line found SHAFT_PARTLY, to an absolute
  * error of `tolerance` m^2 if `most` evaluations of what a point sees reach that; the
  * error estimate goes to *error. NaN and e when memory is short. */
-double occluded_exchange(struct occluded *o, struct clear *clear, const struct sight_line *l,
-                         double tolerance, int most, double *error, struct err *e);
+double occ_occluded_exchange(struct occluded *o, struct unoccluded *clear, const struct shaft *l,
+                             double tolerance, int most, double *error, struct err *e);
 
 #endif

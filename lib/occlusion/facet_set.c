@@ -6,16 +6,16 @@
 #include "lib/base/mem.h"
 #include "lib/base/vec3.h"
 
-void facet_centre(const struct model *m, double centre[3])
+void occ_facet_centre(const struct model *m, double centre[3])
 {
 	for (int k = 0; k < 3; k++) {
 		double lo = INFINITY, hi = -INFINITY;
-		for (size_t i = 0; i < 3 * m->triangles; i++) {
-			double x = m->vertex[3 * (size_t)m->triangle[i] + (size_t)k];
+		for (size_t i = 0; i < 3 * m->triangle.n; i++) {
+			double x = m->vertex[3 * (size_t)m->triangle.corner[i] + (size_t)k];
 			lo = fmin(lo, x);
 			hi = fmax(hi, x);
 		}
-		centre[k] = m->triangles ? lo + (hi - lo) / 2 : 0;
+		centre[k] = m->triangle.n ? lo + (hi - lo) / 2 : 0;
 	}
 }
 
@@ -39,10 +39,10 @@ static int put_one(struct maker *k, const uint32_t *loop, int n, int back)
 
 	for (int i = 0; i < n; i++) {
 		v3_sub(&k->m->vertex[3 * (size_t)loop[back ? n - 1 - i : i]], k->centre, x);
-		if (vec_append(&k->corner, x, 3, sizeof *x, k->e))
+		if (mem_append(&k->corner, x, 3, sizeof *x, k->e))
 			return -1;
 	}
-	return vec_append(&k->facet, &f, 1, sizeof f, k->e);
+	return mem_append(&k->facet, &f, 1, sizeof f, k->e);
 }
 
 /* The same, cut from its first corner into facets of few corners. */
@@ -63,17 +63,17 @@ static int put(struct maker *k, const uint32_t *loop, int n, int back)
  * it is not one convex loop of few corners. */
 static int convex_outline(const struct model *m, uint32_t patch, uint32_t *corner)
 {
-	uint64_t loop = m->patch_loop[patch];
+	uint64_t loop = m->patch.loop[patch];
 	int n = 0;
 
-	if (m->patch_loop[patch + 1] - loop != 1)
+	if (m->patch.loop[patch + 1] - loop != 1)
 		return 0;
-	uint64_t begin = m->loop_start[loop], size = m->loop_start[loop + 1] - begin;
-	const double *front = &m->element_normal[3 * (size_t)m->patch_start[patch]];
+	uint64_t begin = m->patch.loop_start[loop], size = m->patch.loop_start[loop + 1] - begin;
+	const double *front = &m->element.normal[3 * (size_t)m->patch.start[patch]];
 	for (uint64_t i = 0; i < size; i++) {
-		const double *a = &m->vertex[3 * (size_t)m->loop_index[begin + (i + size - 1) % size]];
-		const double *b = &m->vertex[3 * (size_t)m->loop_index[begin + i]];
-		const double *c = &m->vertex[3 * (size_t)m->loop_index[begin + (i + 1) % size]];
+		const double *a = &m->vertex[3 * (size_t)m->patch.loop_index[begin + (i + size - 1) % size]];
+		const double *b = &m->vertex[3 * (size_t)m->patch.loop_index[begin + i]];
+		const double *c = &m->vertex[3 * (size_t)m->patch.loop_index[begin + (i + 1) % size]];
 		double u[3], v[3], turn[3];
 		v3_sub(b, a, u);
 		v3_sub(c, b, v);
@@ -85,7 +85,7 @@ static int convex_outline(const struct model *m, uint32_t patch, uint32_t *corne
 			continue;
 		if (n == OUTLINE)
 			return 0;
-		corner[n++] = m->loop_index[begin + i];
+		corner[n++] = m->patch.loop_index[begin + i];
 	}
 	return n >= 3 ? n : 0;
 }
@@ -95,13 +95,13 @@ static int put_patch_side(struct maker *k, uint32_t ps)
 	const struct model *m = k->m;
 	uint32_t patch = ps >> 1, corner[OUTLINE];
 
-	if (m->patch_loop[patch + 1] == m->patch_loop[patch] || !model_side_modelled(m, ps))
+	if (m->patch.loop[patch + 1] == m->patch.loop[patch] || !model_side_modelled(m, ps))
 		return 0;
 	int n = convex_outline(m, patch, corner);
 	if (n)
 		return put(k, corner, n, (int)(ps & 1));
-	for (uint32_t i = m->patch_start[patch]; i < m->patch_start[patch + 1]; i++)
-		if (put(k, &m->element[3 * (size_t)i], 3, (int)(ps & 1)))
+	for (uint32_t i = m->patch.start[patch]; i < m->patch.start[patch + 1]; i++)
+		if (put(k, &m->element.corner[3 * (size_t)i], 3, (int)(ps & 1)))
 			return -1;
 	return 0;
 }
@@ -110,9 +110,9 @@ static int put_element_side(struct maker *k, uint32_t es)
 {
 	const struct model *m = k->m;
 
-	if (!model_side_modelled(m, 2 * m->element_patch[es >> 1] + (es & 1)))
+	if (!model_side_modelled(m, 2 * m->element.patch[es >> 1] + (es & 1)))
 		return 0;
-	return put(k, &m->element[3 * (size_t)(es >> 1)], 3, (int)(es & 1));
+	return put(k, &m->element.corner[3 * (size_t)(es >> 1)], 3, (int)(es & 1));
 }
 
 /* Keeps the points of all levels, or of the cheap ones where facets are many. */
@@ -123,7 +123,7 @@ static int store_points(struct facet_set *s, struct err *e)
 
 	for (size_t i = 0; i < s->facets; i++)
 		for (int l = 0; l < levels; l++)
-			total += (size_t)cubature_points(s->facet[i].n, l);
+			total += (size_t)geo_cubature_points(s->facet[i].n, l);
 	s->stored = mem_new(s->facets, sizeof *s->stored, "cubature points", e);
 	s->points = mem_new(total, 4 * sizeof *s->points, "cubature points", e);
 	s->joint = mem_new(s->facets, sizeof *s->joint, "cubature points", e);
@@ -131,25 +131,25 @@ static int store_points(struct facet_set *s, struct err *e)
 		return -1;
 	double *at = s->points;
 	for (size_t i = 0; i < s->facets; i++) {
-		joint_fill(&s->facet[i], &s->joint[i]);
+		geo_pair_fill(&s->facet[i], &s->joint[i]);
 		for (int l = 0; l < levels; l++) {
-			size_t n = (size_t)cubature_points(s->facet[i].n, l);
+			size_t n = (size_t)geo_cubature_points(s->facet[i].n, l);
 			s->stored[i][l] = (struct cubature){ 0, at, at + n, at + 2 * n, at + 3 * n };
-			cubature_fill(&s->facet[i], l, &s->stored[i][l]);
+			geo_cubature_fill(&s->facet[i], l, &s->stored[i][l]);
 			at += 4 * n;
 		}
 	}
 	return 0;
 }
 
-int facet_set_init(struct facet_set *s, const struct model *m, enum facet_places of,
-                   struct err *e)
+int occ_facet_set_init(struct facet_set *s, const struct model *m, enum facet_places of,
+                       struct err *e)
 {
 	struct maker k = { .m = m, .e = e };
-	size_t places = 2 * (of == FACETS_OF_PATCHES ? m->patches : m->elements), at = 0;
+	size_t places = 2 * (of == FACETS_OF_PATCHES ? m->patch.n : m->element.n), at = 0;
 
 	*s = (struct facet_set){ .places = places };
-	facet_centre(m, k.centre);
+	occ_facet_centre(m, k.centre);
 	s->start = mem_new(places + 1, sizeof *s->start, "facets", e);
 	int bad = !s->start;
 	for (uint32_t i = 0; !bad && i < places; i++) {
@@ -164,12 +164,12 @@ int facet_set_init(struct facet_set *s, const struct model *m, enum facet_places
 	for (size_t i = 0; !bad && i < s->facets; i++) {
 		s->facet[i].v = s->corner + at;
 		at += 3 * (size_t)s->facet[i].n;
-		facet_measure(&s->facet[i]);
+		geo_facet_measure(&s->facet[i]);
 	}
 	return bad || store_points(s, e) ? -1 : 0;
 }
 
-void facet_set_free(struct facet_set *s)
+void occ_facet_set_free(struct facet_set *s)
 {
 	free(s->start);
 	free(s->facet);

@@ -18,18 +18,18 @@ struct facet_set {
 	double *corner;
 	struct cubature (*stored)[CUBATURE_LEVELS]; /* [facets], n = 0: not kept */
 	double *points;           /* of all of them */
-	struct joint *joint;      /* [facets] */
+	struct cubature_pair *joint;      /* [facets] */
 };
 
 enum facet_places { FACETS_OF_PATCHES, FACETS_OF_ELEMENTS };
 
 /* The centre that all facets of a model are relative to. */
-void facet_centre(const struct model *m, double centre[3]);
+void occ_facet_centre(const struct model *m, double centre[3]);
 
 /* Planar patch-sides: their outline, cut up where it has many corners, or their elements
  * where it is not convex; or all element-sides. O(elements). 0, or -1 and e. */
-int facet_set_init(struct facet_set *s, const struct model *m, enum facet_places of,
-                   struct err *e);
-void facet_set_free(struct facet_set *s);
+int occ_facet_set_init(struct facet_set *s, const struct model *m, enum facet_places of,
+                       struct err *e);
+void occ_facet_set_free(struct facet_set *s);
 
 #endif

@@ -8,12 +8,12 @@
 
 /* ---- what of a body is in front of a facet ---- */
 
-static void put_corner(struct blocker *o, const double x[3])
+static void put_corner(struct occluder *o, const double x[3])
 {
 	memcpy(o->corner[o->corners++], x, 3 * sizeof *x);
 }
 
-static void put_edge(struct blocker *o, const double a[3], const double b[3],
+static void put_edge(struct occluder *o, const double a[3], const double b[3],
                      const double along[3], int left, int right)
 {
 	memcpy(o->edge[o->edges].a, a, 3 * sizeof *a);
@@ -25,8 +25,8 @@ static void put_edge(struct blocker *o, const double a[3], const double b[3],
 
 /* Where the plane that cuts a body crosses each of its faces. */
 struct cut {
-	int points[BODY_FACES];
-	double point[BODY_FACES][2][3];
+	int points[OCCLUDER_BODY_FACES];
+	double point[OCCLUDER_BODY_FACES][2][3];
 };
 
 static void note_cut(struct cut *c, int face, const double x[3])
@@ -36,11 +36,11 @@ static void note_cut(struct cut *c, int face, const double x[3])
 }
 
 /* Edges, and what is cut off them. h: heights of the corners over the plane. */
-static void put_edges(const struct body_set *s, const struct body *b, const double *h,
-                      struct blocker *out, struct cut *cut)
+static void put_edges(const struct occluder_set *s, const struct occluder_body *b, const double *h,
+                      struct occluder *out, struct cut *cut)
 {
 	for (uint32_t i = 0; i < b->edges; i++) {
-		const struct body_edge *e = &s->edge[b->edge + i];
+		const struct occluder_edge *e = &s->edge[b->edge + i];
 		const double *p = &s->corner[3 * (size_t)e->a], *q = &s->corner[3 * (size_t)e->b];
 		double hp = h[e->a - b->corner], hq = h[e->b - b->corner], x[3];
 		int p_in = hp >= -s->near, q_in = hq >= -s->near;
@@ -51,7 +51,7 @@ static void put_edges(const struct body_set *s, const struct body *b, const doub
 		if (!p_in && !q_in)
 			continue;
 		if (p_in ? hp > s->near : hq > s->near) {
-			edge_divide(p, hp, q, hq, x);
+			geo_edge_divide(p, hp, q, hq, x);
 			put_corner(out, x);
 			put_edge(out, p_in ? p : x, p_in ? x : q, e->along, e->left, e->right);
 		} else {
@@ -63,12 +63,12 @@ static void put_edges(const struct body_set *s, const struct body *b, const doub
 	}
 }
 
-int blocker_make(const struct body_set *s, uint32_t body, const struct facet *f,
-                 struct blocker *out)
+int occ_occluder_make(const struct occluder_set *s, uint32_t body, const struct facet *f,
+                      struct occluder *out)
 {
-	const struct body *b = &s->body[body];
+	const struct occluder_body *b = &s->body[body];
 	struct cut cut = { { 0 }, { { { 0 } } } };
-	double h[BLOCKER_CORNERS], along[3];
+	double h[OCCLUDER_CORNERS], along[3];
 
 	out->corners = out->edges = 0;
 	out->faces = (int)b->faces;
@@ -101,10 +101,10 @@ int blocker_make(const struct body_set *s, uint32_t body, const struct facet *f,
 /* ---- what it hides ---- */
 
 /* Does the segment from p to q meet the blocker? */
-static int cuts_flat(const struct blocker *b, const double p[3], const double q[3], double near)
+static int cuts_flat(const struct occluder *b, const double p[3], const double q[3], double near)
 {
 	const struct plane *plane = &b->face[0];
-	double hp = plane_height(plane, p), hq = plane_height(plane, q), x[3];
+	double hp = occ_plane_height(plane, p), hq = occ_plane_height(plane, q), x[3];
 
 	if (!((hp > near && hq < -near) || (hp < -near && hq > near)))
 		return 0;
@@ -123,13 +123,13 @@ static int cuts_flat(const struct blocker *b, const double p[3], const double q[
 	return 1;
 }
 
-static int cuts_solid(const struct blocker *b, const double p[3], const double q[3], double near)
+static int cuts_solid(const struct occluder *b, const double p[3], const double q[3], double near)
 {
 	double from = 0, to = 1;
 
 	for (int i = 0; i < b->faces; i++) {
-		double hp = plane_height(&b->face[i], p) - near;
-		double hq = plane_height(&b->face[i], q) - near;
+		double hp = occ_plane_height(&b->face[i], p) - near;
+		double hq = occ_plane_height(&b->face[i], q) - near;
 		if (hp > 0 && hq > 0)
 			return 0;
 		if (hp > 0)
@@ -140,8 +140,8 @@ static int cuts_solid(const struct blocker *b, const double p[3], const double q
 	return from <= to;
 }
 
-int blocker_hides(const struct blocker *b, const struct facet *f, const struct facet *g,
-                  double near)
+int occ_occluder_hides(const struct occluder *b, const struct facet *f, const struct facet *g,
+                       double near)
 {
 	for (int i = 0; i < f->n; i++)
 		for (int j = 0; j < g->n; j++)
@@ -151,22 +151,22 @@ int blocker_hides(const struct blocker *b, const struct facet *f, const struct f
 	return 1;
 }
 
-int blockers_hide(const struct blocker *b, uint64_t from, const struct facet *f,
-                  const struct facet *g, double near, int depth)
+int occ_occluders_hide(const struct occluder *b, uint64_t from, const struct facet *f,
+                       const struct facet *g, double near, int depth)
 {
 	struct facet_room half[2];
 	struct facet eye = { .n = 1, .v = f->centre }, aim = { .n = 1, .v = g->centre };
 	int crossed = 0;
 
 	for (uint64_t i = from; i; i &= i - 1) {
-		const struct blocker *k = &b[__builtin_ctzll(i)];
-		if (!blocker_hides(k, &eye, &aim, near))
+		const struct occluder *k = &b[__builtin_ctzll(i)];
+		if (!occ_occluder_hides(k, &eye, &aim, near))
 			continue;
 		crossed = 1;
-		if (blocker_hides(k, f, g, near))
+		if (occ_occluder_hides(k, f, g, near))
 			return 1;
 	}
-	return crossed && depth > 0 && facet_halve(g, half) &&
-	       blockers_hide(b, from, f, &half[0].f, near, depth - 1) &&
-	       blockers_hide(b, from, f, &half[1].f, near, depth - 1);
+	return crossed && depth > 0 && geo_facet_halve(g, half) &&
+	       occ_occluders_hide(b, from, f, &half[0].f, near, depth - 1) &&
+	       occ_occluders_hide(b, from, f, &half[1].f, near, depth - 1);
 }

@@ -9,7 +9,7 @@
 struct inside {
 	const struct polygons *p;
 	const struct solid *s;
-	struct plane face[BODY_FACES];
+	struct plane face[OCCLUDER_BODY_FACES];
 	int faces;
 	double lo[3], hi[3];
 	uint32_t found[INSIDERS];
@@ -29,7 +29,7 @@ static void find_box(struct inside *in)
 		in->face[in->faces++] = q->plane;
 		for (uint32_t c = 0; c < q->n; c++)
 			for (int k = 0; k < 3; k++) {
-				double x = polygon_point(in->p, q->first + c)[k];
+				double x = occ_polygon_point(in->p, q->first + c)[k];
 				in->lo[k] = fmin(in->lo[k], x);
 				in->hi[k] = fmax(in->hi[k], x);
 			}
@@ -45,7 +45,7 @@ static int box_apart(const struct inside *in, const struct polygon *q)
 	for (int k = 0; k < 3; k++) {
 		int below = 1, above = 1;
 		for (uint32_t c = 0; c < q->n && (below || above); c++) {
-			double x = polygon_point(in->p, q->first + c)[k];
+			double x = occ_polygon_point(in->p, q->first + c)[k];
 			below = below && x <= in->lo[k] + near;
 			above = above && x >= in->hi[k] - near;
 		}
@@ -58,16 +58,16 @@ static int box_apart(const struct inside *in, const struct polygon *q)
 /* The corners of a polygon that are left behind a plane, in place. */
 static int clip(double (*v)[3], int n, const struct plane *p, double near)
 {
-	double kept[FLAT_CORNERS + BODY_FACES][3];
+	double kept[FLAT_CORNERS + OCCLUDER_BODY_FACES][3];
 	int m = 0;
 
 	for (int i = 0; i < n; i++) {
 		const double *a = v[i], *b = v[(i + 1) % n];
-		double ha = plane_height(p, a) + near, hb = plane_height(p, b) + near;
-		if (ha <= 0 && m < FLAT_CORNERS + BODY_FACES)
+		double ha = occ_plane_height(p, a) + near, hb = occ_plane_height(p, b) + near;
+		if (ha <= 0 && m < FLAT_CORNERS + OCCLUDER_BODY_FACES)
 			memcpy(kept[m++], a, sizeof *kept);
-		if (((ha < 0 && hb > 0) || (ha > 0 && hb < 0)) && m < FLAT_CORNERS + BODY_FACES)
-			edge_divide(a, ha, b, hb, kept[m++]);
+		if (((ha < 0 && hb > 0) || (ha > 0 && hb < 0)) && m < FLAT_CORNERS + OCCLUDER_BODY_FACES)
+			geo_edge_divide(a, ha, b, hb, kept[m++]);
 	}
 	memcpy(v, kept, (size_t)m * sizeof *kept);
 	return m;
@@ -76,14 +76,14 @@ static int clip(double (*v)[3], int n, const struct plane *p, double near)
 /* 0: a polygon has no part in the interior, 1: some, 2: all of it is in the solid. */
 static int part_inside(const struct inside *in, const struct polygon *q)
 {
-	double v[FLAT_CORNERS + BODY_FACES][3], near = in->p->near;
+	double v[FLAT_CORNERS + OCCLUDER_BODY_FACES][3], near = in->p->near;
 	int n = (int)q->n, whole = 1;
 
 	for (int i = 0; i < n; i++)
-		memcpy(v[i], polygon_point(in->p, q->first + (uint32_t)i), sizeof v[i]);
+		memcpy(v[i], occ_polygon_point(in->p, q->first + (uint32_t)i), sizeof v[i]);
 	for (int f = 0; f < in->faces; f++)
 		for (int i = 0; i < n && whole; i++)
-			whole = plane_height(&in->face[f], v[i]) <= near;
+			whole = occ_plane_height(&in->face[f], v[i]) <= near;
 	for (int f = 0; f < in->faces && n >= 3; f++)
 		n = clip(v, n, &in->face[f], near);
 	return n < 3 ? 0 : 1 + whole;
@@ -112,7 +112,7 @@ static int sides(const struct polygons *p, const struct polygon *a, const struct
 	int bits = 0;
 
 	for (uint32_t i = 0; i < b->n; i++) {
-		double h = plane_height(&a->plane, polygon_point(p, b->first + i));
+		double h = occ_plane_height(&a->plane, occ_polygon_point(p, b->first + i));
 		bits |= h > p->near ? 1 : h < -p->near ? 2 : 0;
 	}
 	return bits;
@@ -137,7 +137,7 @@ static int all_blind(const struct inside *in)
 	return 1;
 }
 
-int solid_is_opaque(const struct polygons *p, const struct solid *s, const uint32_t *set)
+int occ_solid_is_opaque(const struct polygons *p, const struct solid *s, const uint32_t *set)
 {
 	const struct polygon *poly = p->polygon.data;
 	struct inside in = { .p = p, .s = s };

@@ -18,7 +18,7 @@ struct merger {
 	struct polygons *p;
 	uint32_t *triangle;           /* [triangles][3] distinct points */
 	size_t triangles;
-	struct edges edges;
+	struct half_edges edges;
 	uint32_t *set;                /* union-find of coplanar triangles */
 	uint32_t *order;              /* triangles by set */
 	uint32_t *next;               /* [points] next corner of the outline being traced */
@@ -35,18 +35,18 @@ static int weld(struct merger *g)
 	int bad = !group || !id;
 
 	model_box(m, lo, hi);
-	facet_centre(m, centre);
+	occ_facet_centre(m, centre);
 	v3_sub(hi, lo, diagonal);
 	p->near = near_fraction * v3_length(diagonal);
 	tolerance = p->near;
-	struct weld w = { m->vertices, m->vertex, group, 1, &tolerance, m->triangles, m->triangle };
-	bad = bad || weld_points(&w, id, &p->points, g->e);
+	struct weld w = { m->vertices, m->vertex, group, 1, &tolerance, m->triangle.n, m->triangle.corner };
+	bad = bad || geo_weld_points(&w, id, &p->points, g->e);
 	p->point = bad ? NULL : mem_new(p->points, 3 * sizeof *p->point, "points", g->e);
 	bad = bad || !p->point;
 	for (size_t v = m->vertices; !bad && v-- > 0;) /* the first of each stays */
 		v3_sub(&m->vertex[3 * v], centre, &p->point[3 * (size_t)id[v]]);
-	for (size_t i = 0; !bad && i < 3 * m->triangles; i++)
-		g->triangle[i] = id[m->triangle[i]];
+	for (size_t i = 0; !bad && i < 3 * m->triangle.n; i++)
+		g->triangle[i] = id[m->triangle.corner[i]];
 	free(group);
 	free(id);
 	return bad;
@@ -74,13 +74,13 @@ static void join(struct merger *g, uint32_t edge)
 	const uint32_t *use = &g->edges.use[g->edges.start[edge]];
 	uint32_t t = use[0] / 3, u = use[1] / 3;
 
-	if (half_from(g->triangle, use[0]) != half_to(g->triangle, use[1]))
+	if (geo_half_edge_from(g->triangle, use[0]) != geo_half_edge_to(g->triangle, use[1]))
 		return;
 	struct plane p = plane_of(g, t), q = plane_of(g, u);
-	double a = plane_height(&p, at(g, half_apex(g->triangle, use[1])));
-	double b = plane_height(&q, at(g, half_apex(g->triangle, use[0])));
+	double a = occ_plane_height(&p, at(g, geo_half_edge_apex(g->triangle, use[1])));
+	double b = occ_plane_height(&q, at(g, geo_half_edge_apex(g->triangle, use[0])));
 	if (v3_dot(p.normal, q.normal) > .5 && fabs(a) <= g->p->near && fabs(b) <= g->p->near)
-		sets_join(g->set, t, u);
+		geo_sets_join(g->set, t, u);
 }
 
 static int put_polygon(struct merger *g, const uint32_t *corner, uint32_t n, int two_sided)
@@ -99,18 +99,18 @@ static int put_polygon(struct merger *g, const uint32_t *corner, uint32_t n, int
 	for (uint32_t i = 0; i < n; i++)
 		sum += v3_dot(q.plane.normal, at(g, corner[i]));
 	q.plane.offset = sum / n;
-	return vec_append(&g->p->corner, corner, n, sizeof *corner, g->e) ||
-	       vec_append(&g->p->polygon, &q, 1, sizeof q, g->e) ? -1 : 0;
+	return mem_append(&g->p->corner, corner, n, sizeof *corner, g->e) ||
+	       mem_append(&g->p->polygon, &q, 1, sizeof q, g->e) ? -1 : 0;
 }
 
 /* Is a half-edge on the outline of the set of its triangle? */
 static int outer(const struct merger *g, uint32_t half)
 {
-	uint32_t edge = g->edges.of[half], set = sets_find(g->set, half / 3);
+	uint32_t edge = g->edges.of[half], set = geo_sets_find(g->set, half / 3);
 	const uint32_t *use = &g->edges.use[g->edges.start[edge]];
 
 	for (uint32_t i = 0; i < g->edges.start[edge + 1] - g->edges.start[edge]; i++)
-		if (use[i] != half && sets_find(g->set, use[i] / 3) == set)
+		if (use[i] != half && geo_sets_find(g->set, use[i] / 3) == set)
 			return 0;
 	return 1;
 }
@@ -127,9 +127,9 @@ static uint32_t outline(struct merger *g, const uint32_t *tri, size_t n, uint32_
 		uint32_t half = 3 * tri[i / 3] + (uint32_t)(i % 3);
 		if (!outer(g, half))
 			continue;
-		first = half_from(g->triangle, half);
+		first = geo_half_edge_from(g->triangle, half);
 		simple = simple && g->next[first] == UINT32_MAX;
-		g->next[first] = half_to(g->triangle, half);
+		g->next[first] = geo_half_edge_to(g->triangle, half);
 		halves++;
 	}
 	for (uint32_t a = first, b; simple && seen < halves; a = b, seen++) {
@@ -158,7 +158,7 @@ static int flat(const struct merger *g, const uint32_t *tri, size_t n)
 	struct plane p = plane_of(g, tri[0]);
 
 	for (size_t i = 0; i < 3 * n; i++)
-		if (fabs(plane_height(&p, at(g, g->triangle[3 * tri[i / 3] + i % 3]))) > 4 * g->p->near)
+		if (fabs(occ_plane_height(&p, at(g, g->triangle[3 * tri[i / 3] + i % 3]))) > 4 * g->p->near)
 			return 0;
 	return 1;
 }
@@ -167,7 +167,7 @@ static int has_back(const struct merger *g, uint32_t triangle)
 {
 	const struct model *m = g->m;
 
-	return !m->material.one_sided[m->surface.material[m->triangle_surface[triangle]]];
+	return !m->material.one_sided[m->surface.material[m->triangle.surface[triangle]]];
 }
 
 static int put_set(struct merger *g, const uint32_t *tri, size_t n)
@@ -194,11 +194,11 @@ static int order_sets(struct merger *g)
 	if (!count)
 		return -1;
 	for (uint32_t t = 0; t < g->triangles; t++)
-		count[sets_find(g->set, t) + 1]++;
+		count[geo_sets_find(g->set, t) + 1]++;
 	for (size_t t = 0; t < g->triangles; t++)
 		count[t + 1] += count[t];
 	for (uint32_t t = 0; t < g->triangles; t++)
-		g->order[count[sets_find(g->set, t)]++] = t;
+		g->order[count[geo_sets_find(g->set, t)]++] = t;
 	free(count);
 	return 0;
 }
@@ -212,8 +212,8 @@ static int merge(struct merger *g)
 		return -1;
 	memset(g->next, 0xff, g->p->points * sizeof *g->next);
 	for (size_t i = 0, end; i < g->triangles; i = end) {
-		uint32_t set = sets_find(g->set, g->order[i]);
-		for (end = i; end < g->triangles && sets_find(g->set, g->order[end]) == set;)
+		uint32_t set = geo_sets_find(g->set, g->order[i]);
+		for (end = i; end < g->triangles && geo_sets_find(g->set, g->order[end]) == set;)
 			end++;
 		if (put_set(g, g->order + i, end - i))
 			return -1;
@@ -221,26 +221,26 @@ static int merge(struct merger *g)
 	return 0;
 }
 
-int polygons_init(struct polygons *p, const struct model *m, struct err *e)
+int occ_polygons_init(struct polygons *p, const struct model *m, struct err *e)
 {
-	struct merger g = { .m = m, .p = p, .triangles = m->triangles, .e = e };
+	struct merger g = { .m = m, .p = p, .triangles = m->triangle.n, .e = e };
 
 	*p = (struct polygons){ 0 };
-	g.triangle = mem_new(m->triangles, 3 * sizeof *g.triangle, "polygons", e);
-	g.order = mem_new(m->triangles, sizeof *g.order, "polygons", e);
-	g.set = sets_new(m->triangles, e);
+	g.triangle = mem_new(m->triangle.n, 3 * sizeof *g.triangle, "polygons", e);
+	g.order = mem_new(m->triangle.n, sizeof *g.order, "polygons", e);
+	g.set = geo_sets_new(m->triangle.n, e);
 	int bad = !g.triangle || !g.order || !g.set || weld(&g) ||
-	          edges_build(&g.edges, g.triangle, g.triangles, p->points, e) ||
+	          geo_half_edges_build(&g.edges, g.triangle, g.triangles, p->points, e) ||
 	          !(g.next = mem_new(p->points, sizeof *g.next, "polygons", e)) || merge(&g);
 	free(g.triangle);
 	free(g.order);
 	free(g.set);
 	free(g.next);
-	edges_free(&g.edges);
+	geo_half_edges_free(&g.edges);
 	return bad ? -1 : 0;
 }
 
-void polygons_free(struct polygons *p)
+void occ_polygons_free(struct polygons *p)
 {
 	free(p->point);
 	free(p->polygon.data);

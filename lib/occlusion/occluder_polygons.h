@@ -1,4 +1,4 @@
-/* The scene's triangles merged into convex polygons (private to lib/body*.c). */
+/* The scene's triangles merged into convex polygons (private to lib/occlusion). */
 #ifndef TWOPASS_OCCLUDER_POLYGONS_H
 #define TWOPASS_OCCLUDER_POLYGONS_H
 
@@ -15,19 +15,19 @@ struct polygons {
 	double *point;                /* [points][3] distinct corners */
 	size_t points;
 	struct vec polygon, corner;   /* struct polygon; uint32_t points */
-	double near;                  /* see body_set */
+	double near;                  /* see occluder_set */
 };
 
 /* O(n log n). 0, or -1 and e. */
-int polygons_init(struct polygons *p, const struct model *m, struct err *e);
-void polygons_free(struct polygons *p);
+int occ_polygons_init(struct polygons *p, const struct model *m, struct err *e);
+void occ_polygons_free(struct polygons *p);
 
-static inline const double *polygon_point(const struct polygons *p, uint32_t corner)
+static inline const double *occ_polygon_point(const struct polygons *p, uint32_t corner)
 {
 	return &p->point[3 * (size_t)((const uint32_t *)p->corner.data)[corner]];
 }
 
-static inline double plane_height(const struct plane *p, const double x[3])
+static inline double occ_plane_height(const struct plane *p, const double x[3])
 {
 	return p->normal[0] * x[0] + p->normal[1] * x[1] + p->normal[2] * x[2] - p->offset;
 }

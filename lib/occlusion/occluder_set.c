@@ -25,7 +25,7 @@ struct maker {
 
 /* ---- bodies ---- */
 
-static void bound(const struct maker *k, struct body *b)
+static void bound(const struct maker *k, struct occluder_body *b)
 {
 	const double *x = (const double *)k->corner.data + 3 * (size_t)b->corner;
 
@@ -41,13 +41,13 @@ static void bound(const struct maker *k, struct body *b)
 	}
 }
 
-static void begin_body(const struct maker *k, struct body *b)
+static void begin_body(const struct maker *k, struct occluder_body *b)
 {
-	*b = (struct body){ .corner = (uint32_t)k->corner.n / 3, .edge = (uint32_t)k->edge.n,
+	*b = (struct occluder_body){ .corner = (uint32_t)k->corner.n / 3, .edge = (uint32_t)k->edge.n,
 	                    .face = (uint32_t)k->face.n };
 }
 
-static int end_body(struct maker *k, struct body *b)
+static int end_body(struct maker *k, struct occluder_body *b)
 {
 	const double *x = k->corner.data;
 
@@ -55,12 +55,12 @@ static int end_body(struct maker *k, struct body *b)
 	b->edges = (uint32_t)k->edge.n - b->edge;
 	b->faces = (uint32_t)k->face.n - b->face;
 	for (size_t i = b->edge; i < k->edge.n; i++) {
-		struct body_edge *e = (struct body_edge *)k->edge.data + i;
+		struct occluder_edge *e = (struct occluder_edge *)k->edge.data + i;
 		v3_sub(&x[3 * (size_t)e->b], &x[3 * (size_t)e->a], e->along);
 		v3_normalise(e->along);
 	}
 	bound(k, b);
-	return vec_append(&k->body, b, 1, sizeof *b, k->e);
+	return mem_append(&k->body, b, 1, sizeof *b, k->e);
 }
 
 /* Does a plane have the whole scene on one side? Then it can only be touched. */
@@ -69,7 +69,7 @@ static int on_hull(const struct polygons *p, const struct plane *plane)
 	int above = 0, below = 0;
 
 	for (size_t i = 0; i < p->points && !(above && below); i++) {
-		double h = plane_height(plane, &p->point[3 * i]);
+		double h = occ_plane_height(plane, &p->point[3 * i]);
 		above |= h > p->near;
 		below |= h < -p->near;
 	}
@@ -87,23 +87,23 @@ static int all_on_hull(const struct polygons *p, const struct solid *s)
 static int put_flat(struct maker *k, uint32_t polygon)
 {
 	const struct polygon *q = (const struct polygon *)k->p.polygon.data + polygon;
-	struct body b;
+	struct occluder_body b;
 
 	if (on_hull(&k->p, &q->plane))
 		return 0;
 	begin_body(k, &b);
 	b.flat = 1;
 	for (uint32_t i = 0; i < q->n; i++) {
-		struct body_edge edge = { .a = b.corner + i, .b = b.corner + (i + 1) % q->n };
-		if (vec_append(&k->corner, polygon_point(&k->p, q->first + i), 3, sizeof(double), k->e) ||
-		    vec_append(&k->edge, &edge, 1, sizeof edge, k->e))
+		struct occluder_edge edge = { .a = b.corner + i, .b = b.corner + (i + 1) % q->n };
+		if (mem_append(&k->corner, occ_polygon_point(&k->p, q->first + i), 3, sizeof(double), k->e) ||
+		    mem_append(&k->edge, &edge, 1, sizeof edge, k->e))
 			return -1;
 	}
-	return vec_append(&k->face, &q->plane, 1, sizeof q->plane, k->e) || end_body(k, &b);
+	return mem_append(&k->face, &q->plane, 1, sizeof q->plane, k->e) || end_body(k, &b);
 }
 
 /* The number of a point in a body under way, added if it is new. */
-static int body_corner(struct maker *k, const struct body *b, uint32_t *known, uint32_t *n,
+static int body_corner(struct maker *k, const struct occluder_body *b, uint32_t *known, uint32_t *n,
                        uint32_t point, uint32_t *corner)
 {
 	uint32_t i = 0;
@@ -114,7 +114,7 @@ static int body_corner(struct maker *k, const struct body *b, uint32_t *known, u
 	if (i < *n)
 		return 0;
 	known[(*n)++] = point;
-	return vec_append(&k->corner, &k->p.point[3 * (size_t)point], 3, sizeof(double), k->e);
+	return mem_append(&k->corner, &k->p.point[3 * (size_t)point], 3, sizeof(double), k->e);
 }
 
 static uint16_t face_number(const struct solid *s, uint32_t polygon)
@@ -129,25 +129,25 @@ static uint16_t face_number(const struct solid *s, uint32_t polygon)
 static int put_solid(struct maker *k, const struct solid *s)
 {
 	const struct polygon *poly = k->p.polygon.data;
-	uint32_t known[2 * BODY_EDGES * 2], n = 0;
-	struct body b;
+	uint32_t known[2 * OCCLUDER_BODY_EDGES * 2], n = 0;
+	struct occluder_body b;
 
 	begin_body(k, &b);
 	for (size_t i = 0; i < s->polygons; i++)
-		if (vec_append(&k->face, &poly[s->polygon[i]].plane, 1, sizeof(struct plane), k->e))
+		if (mem_append(&k->face, &poly[s->polygon[i]].plane, 1, sizeof(struct plane), k->e))
 			return -1;
-	if (!s->closed && vec_append(&k->face, &s->missing, 1, sizeof s->missing, k->e))
+	if (!s->closed && mem_append(&k->face, &s->missing, 1, sizeof s->missing, k->e))
 		return -1;
 	for (size_t i = 0; i < s->sides; i++) {
 		const struct side *x = &s->side[i];
 		int pair = i + 1 < s->sides && x[1].low == x->low && x[1].high == x->high;
-		struct body_edge edge = { .left = face_number(s, x->polygon),
+		struct occluder_edge edge = { .left = face_number(s, x->polygon),
 		                          .right = (uint16_t)s->polygons };
 		if (pair)
 			edge.right = face_number(s, x[1].polygon);
 		if (body_corner(k, &b, known, &n, x->low, &edge.a) ||
 		    body_corner(k, &b, known, &n, x->high, &edge.b) ||
-		    vec_append(&k->edge, &edge, 1, sizeof edge, k->e))
+		    mem_append(&k->edge, &edge, 1, sizeof edge, k->e))
 			return -1;
 		i += (size_t)pair;
 	}
@@ -161,8 +161,8 @@ static int put_group(struct maker *k, const uint32_t *polygon, size_t n)
 	                   .sides = k->first_side[k->set[polygon[0]] + 1] -
 	                            k->first_side[k->set[polygon[0]]] };
 
-	if (n > 2 && solid_check(&k->p, &s) && !all_on_hull(&k->p, &s) &&
-	    solid_is_opaque(&k->p, &s, k->set))
+	if (n > 2 && occ_solid_check(&k->p, &s) && !all_on_hull(&k->p, &s) &&
+	    occ_solid_is_opaque(&k->p, &s, k->set))
 		return put_solid(k, &s);
 	for (size_t i = 0; i < n; i++)
 		if (put_flat(k, polygon[i]))
@@ -192,7 +192,7 @@ static int put_bodies(struct maker *k)
 	if (!next)
 		return -1;
 	for (uint32_t i = 0; i < n; i++)
-		k->set[i] = sets_find(k->set, i);
+		k->set[i] = geo_sets_find(k->set, i);
 	sort_sides(k, n);
 	for (uint32_t i = 0; i < n; i++)
 		next[k->set[i] + 1]++;
@@ -214,7 +214,7 @@ static int put_bodies(struct maker *k)
 
 static int by_centre(const void *a, const void *b, int axis)
 {
-	const struct body *x = a, *y = b;
+	const struct occluder_body *x = a, *y = b;
 
 	if (x->centre[axis] != y->centre[axis])
 		return x->centre[axis] < y->centre[axis] ? -1 : 1;
@@ -226,14 +226,14 @@ static int by_centre_y(const void *a, const void *b) { return by_centre(a, b, 1)
 static int by_centre_z(const void *a, const void *b) { return by_centre(a, b, 2); }
 
 /* Halves the bodies along the longest side of their box until few are left. */
-static void grow(struct body_set *s, uint32_t first, uint32_t count)
+static void grow(struct occluder_set *s, uint32_t first, uint32_t count)
 {
 	static int (*const by_axis[3])(const void *, const void *) = { by_centre_x, by_centre_y,
 	                                                               by_centre_z };
-	struct body_node *n = &s->node[s->nodes++];
+	struct occluder_node *n = &s->node[s->nodes++];
 	int axis = 0;
 
-	*n = (struct body_node){ .first = first, .count = count };
+	*n = (struct occluder_node){ .first = first, .count = count };
 	for (int d = 0; d < 3; d++) {
 		n->lo[d] = INFINITY;
 		n->hi[d] = -INFINITY;
@@ -252,7 +252,7 @@ static void grow(struct body_set *s, uint32_t first, uint32_t count)
 	grow(s, first + count / 2, count - count / 2);
 }
 
-static int make_tree(struct body_set *s, struct err *e)
+static int make_tree(struct occluder_set *s, struct err *e)
 {
 	s->node = mem_new(2 * s->bodies + 1, sizeof *s->node, "tree of bodies", e);
 	if (!s->node)
@@ -262,19 +262,19 @@ static int make_tree(struct body_set *s, struct err *e)
 	return 0;
 }
 
-int body_set_init(struct body_set *s, const struct model *m, struct err *e)
+int occ_occluder_set_init(struct occluder_set *s, const struct model *m, struct err *e)
 {
 	struct maker k = { .e = e };
-	int bad = polygons_init(&k.p, m, e);
+	int bad = occ_polygons_init(&k.p, m, e);
 	size_t n = k.p.polygon.n;
 
-	*s = (struct body_set){ .near = k.p.near };
-	k.set = bad ? NULL : sets_new(n, e);
+	*s = (struct occluder_set){ .near = k.p.near };
+	k.set = bad ? NULL : geo_sets_new(n, e);
 	k.order = mem_new(n, sizeof *k.order, "bodies", e);
 	k.first_side = mem_new(n + 1, sizeof *k.first_side, "bodies", e);
 	k.group_side = mem_new(k.p.corner.n, sizeof *k.group_side, "bodies", e);
 	bad = bad || !k.set || !k.order || !k.first_side || !k.group_side ||
-	      solids_group(&k.p, k.set, &k.side, &k.sides, e) || put_bodies(&k);
+	      occ_solids_group(&k.p, k.set, &k.side, &k.sides, e) || put_bodies(&k);
 	s->body = k.body.data;
 	s->bodies = k.body.n;
 	s->corner = k.corner.data;
@@ -288,16 +288,16 @@ int body_set_init(struct body_set *s, const struct model *m, struct err *e)
 	free(k.first_side);
 	free(k.group_side);
 	free(k.side);
-	polygons_free(&k.p);
+	occ_polygons_free(&k.p);
 	return bad || make_tree(s, e) ? -1 : 0;
 }
 
-void body_set_free(struct body_set *s)
+void occ_occluder_set_free(struct occluder_set *s)
 {
 	free(s->body);
 	free(s->corner);
 	free(s->edge);
 	free(s->face);
 	free(s->node);
-	*s = (struct body_set){ 0 };
+	*s = (struct occluder_set){ 0 };
 }

@@ -14,46 +14,46 @@
 #include "lib/data/model.h"
 
 /* The most that a body may have: its silhouette then has at most 32 edges. */
-enum { BODY_EDGES = 48, BODY_FACES = 32, FLAT_CORNERS = 32 };
+enum { OCCLUDER_BODY_EDGES = 48, OCCLUDER_BODY_FACES = 32, FLAT_CORNERS = 32 };
 
 struct plane {
 	double normal[3], offset;     /* normal . x = offset */
 };
 
 /* An edge between two faces; a flat body has only face 0, on both sides. */
-struct body_edge {
-	uint32_t a, b;                /* corners, in body_set.corner */
+struct occluder_edge {
+	uint32_t a, b;                /* corners, in occluder_set.corner */
 	uint16_t left, right;         /* faces of the body */
 	double along[3];              /* unit vector from a to b */
 };
 
-struct body {
-	uint32_t corner, corners;     /* first and number in body_set.corner */
+struct occluder_body {
+	uint32_t corner, corners;     /* first and number in occluder_set.corner */
 	uint32_t edge, edges;
 	uint32_t face, faces;
 	int flat;
 	double lo[3], hi[3], centre[3];
 };
 
-struct body_node {
+struct occluder_node {
 	double lo[3], hi[3];
 	uint32_t first, count;        /* bodies below */
 	uint32_t right;               /* second child; the first is the next node; 0 = leaf */
 };
 
-/* Corners are relative to facet_centre(). */
-struct body_set {
+/* Corners are relative to occ_facet_centre(). */
+struct occluder_set {
 	size_t bodies, corners, edges, faces, nodes;
-	struct body *body;            /* ordered as the leaves of the tree */
+	struct occluder_body *body;            /* ordered as the leaves of the tree */
 	double *corner;               /* [corners][3] */
-	struct body_edge *edge;
+	struct occluder_edge *edge;
 	struct plane *face;           /* outward normals of solids */
-	struct body_node *node;
+	struct occluder_node *node;
 	double near;                  /* heights up to this count as on a plane, m */
 };
 
 /* O(n log n) in triangles, and O(corners) for each plane on the hull and each solid. 0, or -1 and e. */
-int body_set_init(struct body_set *s, const struct model *m, struct err *e);
-void body_set_free(struct body_set *s);
+int occ_occluder_set_init(struct occluder_set *s, const struct model *m, struct err *e);
+void occ_occluder_set_free(struct occluder_set *s);
 
 #endif

@@ -24,7 +24,7 @@ static int behind(const struct polygons *p, const struct polygon *q, const struc
 	double lowest = 0;
 
 	for (uint32_t i = 0; i < q->n; i++) {
-		double h = plane_height(plane, polygon_point(p, q->first + i));
+		double h = occ_plane_height(plane, occ_polygon_point(p, q->first + i));
 		if (h > p->near)
 			return 0;
 		lowest = fmin(lowest, h);
@@ -32,8 +32,8 @@ static int behind(const struct polygons *p, const struct polygon *q, const struc
 	return lowest < -p->near;
 }
 
-int solids_group(const struct polygons *p, uint32_t *set, struct side **sides, size_t *count,
-                 struct err *e)
+int occ_solids_group(const struct polygons *p, uint32_t *set, struct side **sides, size_t *count,
+                     struct err *e)
 {
 	const struct polygon *poly = p->polygon.data;
 	const uint32_t *corner = p->corner.data;
@@ -57,7 +57,7 @@ int solids_group(const struct polygons *p, uint32_t *set, struct side **sides, s
 		const struct polygon *a = &poly[side[i].polygon], *b = &poly[side[end - 1].polygon];
 		if (end - i == 2 && side[i].up != side[i + 1].up && behind(p, a, &b->plane) &&
 		    behind(p, b, &a->plane))
-			sets_join(set, side[i].polygon, side[i + 1].polygon);
+			geo_sets_join(set, side[i].polygon, side[i + 1].polygon);
 	}
 	return 0;
 }
@@ -104,26 +104,26 @@ static int all_behind(const struct polygons *p, const struct solid *s, const str
 
 	for (size_t i = 0; i < s->polygons; i++)
 		for (uint32_t k = 0; k < poly[s->polygon[i]].n; k++)
-			if (plane_height(plane, polygon_point(p, poly[s->polygon[i]].first + k)) >
+			if (occ_plane_height(plane, occ_polygon_point(p, poly[s->polygon[i]].first + k)) >
 			    2 * p->near)
 				return 0;
 	return 1;
 }
 
-int solid_check(const struct polygons *p, struct solid *s)
+int occ_solid_check(const struct polygons *p, struct solid *s)
 {
 	const struct polygon *poly = p->polygon.data;
 	size_t open = missing_plane(p, s, &s->missing);
 
 	s->closed = open == 0;
-	if (s->polygons < 3 || s->polygons + 1 > BODY_FACES ||
-	    s->sides + open > 2 * BODY_EDGES)
+	if (s->polygons < 3 || s->polygons + 1 > OCCLUDER_BODY_FACES ||
+	    s->sides + open > 2 * OCCLUDER_BODY_EDGES)
 		return 0;
 	for (size_t i = 0; i < s->polygons; i++)
 		if (!all_behind(p, s, &poly[s->polygon[i]].plane))
 			return 0;
 	for (size_t i = 0; i < s->sides; i++)
-		if (lone(s, i) && fabs(plane_height(&s->missing, &p->point[3 * (size_t)s->side[i].low])) >
+		if (lone(s, i) && fabs(occ_plane_height(&s->missing, &p->point[3 * (size_t)s->side[i].low])) >
 		                  2 * p->near)
 			return 0;
 	/* The ends of a tube cancel in the sum. */

@@ -1,4 +1,4 @@
-/* Convex solids among polygons (private to lib/body*.c). */
+/* Convex solids among polygons (private to lib/occlusion). */
 #ifndef TWOPASS_OCCLUDER_SOLIDS_H
 #define TWOPASS_OCCLUDER_SOLIDS_H
 
@@ -23,11 +23,11 @@ struct solid {
 
 /* Groups polygons that meet at convex edges: set[i] is the lowest polygon of i's group.
  * sides receives all edges sorted by points (free() it). 0, or -1 and e. O(n log n). */
-int solids_group(const struct polygons *p, uint32_t *set, struct side **sides, size_t *n,
-                 struct err *e);
+int occ_solids_group(const struct polygons *p, uint32_t *set, struct side **sides, size_t *n,
+                     struct err *e);
 
 /* 1 if the group is a convex solid that one plane face at most leaves open; fills
  * missing and closed. */
-int solid_check(const struct polygons *p, struct solid *s);
+int occ_solid_check(const struct polygons *p, struct solid *s);
 
 #endif

@@ -24,14 +24,14 @@ static int side_of(const struct plane *p, const double *x, int n, double near)
 	int above = 0, below = 0;
 
 	for (int i = 0; i < n && !(above && below); i++) {
-		double h = plane_height(p, x + 3 * i);
+		double h = occ_plane_height(p, x + 3 * i);
 		above |= h > near;
 		below |= h < -near;
 	}
 	return above - below;
 }
 
-static int blocker_side(const struct blocker *b, const struct plane *p, double near)
+static int blocker_side(const struct occluder *b, const struct plane *p, double near)
 {
 	return side_of(p, b->corner[0], b->corners, near);
 }
@@ -60,7 +60,7 @@ static void turn_round(struct plane *p)
 /* A plane through an edge of a blocker and a corner of f or g, or the reverse: where it
  * cuts f, it may end a shadow; where it has the blocker on one side and both facets on the
  * other, the blocker does nothing. `kink`: the edge has a parallel one. */
-static void consider(struct cuts *c, const struct blocker *b, int number, struct plane *p,
+static void consider(struct cuts *c, const struct occluder *b, int number, struct plane *p,
                      int kink)
 {
 	struct shadows *s = c->s;
@@ -115,12 +115,12 @@ struct faces {
 	uint64_t front, behind;
 };
 
-static struct faces faces_from(const struct blocker *b, const double x[3], double near)
+static struct faces faces_from(const struct occluder *b, const double x[3], double near)
 {
 	struct faces f = { 0, 0 };
 
 	for (int i = 0; i <= b->faces; i++) {
-		double h = plane_height(&b->face[i], x);
+		double h = occ_plane_height(&b->face[i], x);
 		f.front |= (uint64_t)(h > near) << i;
 		f.behind |= (uint64_t)(h < -near) << i;
 	}
@@ -129,7 +129,7 @@ static struct faces faces_from(const struct blocker *b, const double x[3], doubl
 
 /* Is an edge inside the blocker's silhouette as seen from a point? So it is, then, for
  * all that see it in line with that point. */
-static int within(const struct blocker *b, int edge, struct faces f)
+static int within(const struct occluder *b, int edge, struct faces f)
 {
 	uint64_t both = (uint64_t)1 << b->edge[edge].left | (uint64_t)1 << b->edge[edge].right;
 
@@ -138,7 +138,7 @@ static int within(const struct blocker *b, int edge, struct faces f)
 
 /* Does a face of the blocker have both facets in front of it, or an edge's plane through a
  * corner of f the blocker on one side and them on the other? */
-static void find_idle(struct cuts *c, const struct blocker *b, int number)
+static void find_idle(struct cuts *c, const struct occluder *b, int number)
 {
 	struct plane p;
 
@@ -162,7 +162,7 @@ static void find_idle(struct cuts *c, const struct blocker *b, int number)
 
 /* The corners of a blocker that are first and last as a plane turns about an edge of g, from
  * its outside to its inside. */
-static void first_and_last(const struct cuts *c, const struct blocker *b, int edge,
+static void first_and_last(const struct cuts *c, const struct occluder *b, int edge,
                            const double along[3], int found[2])
 {
 	double outwards[3], d[3], first[2] = { -1, 0 }, last[2] = { 1, 0 };
@@ -185,7 +185,7 @@ static void first_and_last(const struct cuts *c, const struct blocker *b, int ed
 
 /* Planes through an edge of g and corners of a blocker: those that have it on one side, or
  * all. */
-static void corner_cuts(struct cuts *c, const struct blocker *b, int number, int edge,
+static void corner_cuts(struct cuts *c, const struct occluder *b, int number, int edge,
                         const double along[3])
 {
 	const double *from = &c->g->v[3 * edge];
@@ -204,7 +204,7 @@ static void corner_cuts(struct cuts *c, const struct blocker *b, int number, int
 			consider(c, b, number, &p, 0);
 }
 
-static void blocker_cuts(struct cuts *c, const struct blocker *b, int number)
+static void blocker_cuts(struct cuts *c, const struct occluder *b, int number)
 {
 	const struct facet *g = c->g;
 	double along[3];
@@ -225,7 +225,7 @@ static void blocker_cuts(struct cuts *c, const struct blocker *b, int number)
 
 /* Planes through parallel edges of two blockers with one on each side: the gap between them
  * opens there. */
-static void gap_cuts(struct cuts *c, const struct blocker *a, const struct blocker *b, uint64_t of)
+static void gap_cuts(struct cuts *c, const struct occluder *a, const struct occluder *b, uint64_t of)
 {
 	struct plane p;
 
@@ -242,7 +242,7 @@ static void gap_cuts(struct cuts *c, const struct blocker *a, const struct block
 
 /* Planes through an edge of one blocker and a corner of another with each on one side:
  * their shadows meet there, or part. */
-static void meeting_cuts(struct cuts *c, const struct blocker *a, const struct blocker *b,
+static void meeting_cuts(struct cuts *c, const struct occluder *a, const struct occluder *b,
                          uint64_t of)
 {
 	struct plane p;
@@ -262,8 +262,8 @@ static void meeting_cuts(struct cuts *c, const struct blocker *a, const struct b
 	}
 }
 
-void shadow_edges(const struct blocker *b, int blockers, const struct facet *f,
-                  const struct facet *g, double near, struct shadows *s)
+void occ_shadow_edges(const struct occluder *b, int blockers, const struct facet *f,
+                      const struct facet *g, double near, struct shadows *s)
 {
 	struct cuts c = { f, g, near, blockers <= FEW, s };
 
@@ -285,11 +285,11 @@ void shadow_edges(const struct blocker *b, int blockers, const struct facet *f,
 /* ---- cells ---- */
 
 /* Is the blocker beyond one of the planes that hold both facets behind them? */
-static int outside(const struct blocker *b, const struct plane *shaft, int planes, double near)
+static int outside(const struct occluder *b, const struct plane *shaft, int planes, double near)
 {
 	for (int p = 0; p < planes; p++) {
 		int i = 0;
-		while (i < b->corners && plane_height(&shaft[p], b->corner[i]) >= -near)
+		while (i < b->corners && occ_plane_height(&shaft[p], b->corner[i]) >= -near)
 			i++;
 		if (i == b->corners)
 			return 1;
@@ -297,8 +297,8 @@ static int outside(const struct blocker *b, const struct plane *shaft, int plane
 	return 0;
 }
 
-uint64_t shadow_on(const struct blocker *b, const struct shadows *s, uint64_t from,
-                   const struct facet *cell, const struct facet *g, double near, int *hidden)
+uint64_t occ_shadow_on(const struct occluder *b, const struct shadows *s, uint64_t from,
+                       const struct facet *cell, const struct facet *g, double near, int *hidden)
 {
 	struct plane shaft[SHAFT_PLANES];
 	uint64_t left = from;
@@ -309,12 +309,12 @@ uint64_t shadow_on(const struct blocker *b, const struct shadows *s, uint64_t fr
 		    side_of(&s->limit[i], cell->v, cell->n, near) < 0)
 			left &= ~((uint64_t)1 << s->blocker[i]);
 	/* Where the limits of shadows are known they say as much. */
-	int planes = left && !s->limits ? shaft_planes(cell, g, near, shaft) : 0;
+	int planes = left && !s->limits ? occ_shaft_planes(cell, g, near, shaft) : 0;
 	for (uint64_t i = left; i; i &= i - 1) {
 		int k = __builtin_ctzll(i);
 		if (outside(&b[k], shaft, planes, near))
 			left &= ~((uint64_t)1 << k);
-		else if ((*hidden = blocker_hides(&b[k], cell, g, near)))
+		else if ((*hidden = occ_occluder_hides(&b[k], cell, g, near)))
 			return left;
 	}
 	return left;

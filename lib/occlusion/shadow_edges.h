@@ -29,13 +29,13 @@ struct shadows {
  * two blockers, where a gap between them opens, or through a blocker's face that g
  * crosses. No more are kept than fit.
  * O((blockers x edges)^2). */
-void shadow_edges(const struct blocker *b, int blockers, const struct facet *f,
-                  const struct facet *g, double near, struct shadows *s);
+void occ_shadow_edges(const struct occluder *b, int blockers, const struct facet *f,
+                      const struct facet *g, double near, struct shadows *s);
 
 /* What blockers do to the view from a convex cell in the plane of f to g: those of the set
  * bits of `from` that may hide something stay set; 0: nothing does. *hidden is set if one
  * of them hides all. */
-uint64_t shadow_on(const struct blocker *b, const struct shadows *s, uint64_t from,
-                   const struct facet *cell, const struct facet *g, double near, int *hidden);
+uint64_t occ_shadow_on(const struct occluder *b, const struct shadows *s, uint64_t from,
+                       const struct facet *cell, const struct facet *g, double near, int *hidden);
 
 #endif

@@ -8,7 +8,7 @@
 
 /* ---- the shaft between two facets ---- */
 
-static void grow_box(struct sight_line *l, const struct facet *f)
+static void grow_box(struct shaft *l, const struct facet *f)
 {
 	for (int i = 0; i < f->n; i++)
 		for (int k = 0; k < 3; k++) {
@@ -21,7 +21,7 @@ static void grow_box(struct sight_line *l, const struct facet *f)
 static int none_above(const struct facet *f, const struct plane *p, double near)
 {
 	for (int i = 0; i < f->n; i++)
-		if (plane_height(p, &f->v[3 * i]) > near)
+		if (occ_plane_height(p, &f->v[3 * i]) > near)
 			return 0;
 	return 1;
 }
@@ -43,7 +43,7 @@ static int edge_planes(const struct facet *f, const struct facet *g, double near
 			if (!(v3_normalise(p->normal) > 0))
 				continue;
 			p->offset = v3_dot(p->normal, a);
-			if (plane_height(p, f->centre) > 0) {
+			if (occ_plane_height(p, f->centre) > 0) {
 				for (int k = 0; k < 3; k++)
 					p->normal[k] = -p->normal[k];
 				p->offset = -p->offset;
@@ -57,8 +57,8 @@ static int edge_planes(const struct facet *f, const struct facet *g, double near
 	return n;
 }
 
-int shaft_planes(const struct facet *f, const struct facet *g, double near,
-                 struct plane shaft[SHAFT_PLANES])
+int occ_shaft_planes(const struct facet *f, const struct facet *g, double near,
+                     struct plane shaft[SHAFT_PLANES])
 {
 	int n = edge_planes(f, g, near, shaft);
 
@@ -68,7 +68,7 @@ int shaft_planes(const struct facet *f, const struct facet *g, double near,
 /* ---- bodies in it ---- */
 
 /* Can nothing of a body be between? All of it on or behind a facet's plane. */
-static int behind_facet(const struct body_set *s, const struct body *b, const struct facet *f)
+static int behind_facet(const struct occluder_set *s, const struct occluder_body *b, const struct facet *f)
 {
 	const double *x = &s->corner[3 * (size_t)b->corner];
 
@@ -79,22 +79,22 @@ static int behind_facet(const struct body_set *s, const struct body *b, const st
 }
 
 /* Is a facet in a solid, or a part of its faces, as a whole? */
-static int holds(const struct body_set *s, const struct body *b, const struct facet *f)
+static int holds(const struct occluder_set *s, const struct occluder_body *b, const struct facet *f)
 {
 	for (uint32_t i = 0; i < b->faces && !b->flat; i++)
 		for (int c = 0; c < f->n; c++)
-			if (plane_height(&s->face[b->face + i], &f->v[3 * c]) > s->near)
+			if (occ_plane_height(&s->face[b->face + i], &f->v[3 * c]) > s->near)
 				return 0;
 	return !b->flat;
 }
 
-static int outside_shaft(const struct sight_line *l, const struct body *b)
+static int outside_shaft(const struct shaft *l, const struct occluder_body *b)
 {
 	const double *x = &l->set->corner[3 * (size_t)b->corner];
 
 	for (int p = 0; p < l->planes; p++) {
 		uint32_t i = 0;
-		while (i < b->corners && plane_height(&l->shaft[p], &x[3 * i]) >= -l->set->near)
+		while (i < b->corners && occ_plane_height(&l->shaft[p], &x[3 * i]) >= -l->set->near)
 			i++;
 		if (i == b->corners)
 			return 1;
@@ -102,7 +102,7 @@ static int outside_shaft(const struct sight_line *l, const struct body *b)
 	return 0;
 }
 
-static int apart(const struct sight_line *l, const double lo[3], const double hi[3])
+static int apart(const struct shaft *l, const double lo[3], const double hi[3])
 {
 	double near = l->set->near;
 
@@ -128,7 +128,7 @@ static double box_above(const double lo[3], const double hi[3], const struct fac
 }
 
 /* Is a box beyond one of the shaft's planes? */
-static int box_outside(const struct sight_line *l, const double lo[3], const double hi[3])
+static int box_outside(const struct shaft *l, const double lo[3], const double hi[3])
 {
 	for (int p = 0; p < l->planes; p++) {
 		const struct plane *s = &l->shaft[p];
@@ -143,15 +143,15 @@ static int box_outside(const struct sight_line *l, const double lo[3], const dou
 
 /* Bodies that the box and the planes of both facets do not rule out. 0 if there are too
  * many. */
-static int collect(struct sight_line *l)
+static int collect(struct shaft *l)
 {
-	const struct body_set *s = l->set;
+	const struct occluder_set *s = l->set;
 	uint32_t stack[64], depth = 0;
 
 	if (s->nodes)
 		stack[depth++] = 0;
 	while (depth) {
-		const struct body_node *n = &s->node[stack[--depth]];
+		const struct occluder_node *n = &s->node[stack[--depth]];
 		if (apart(l, n->lo, n->hi) || box_above(n->lo, n->hi, l->a) <= s->near ||
 		    box_above(n->lo, n->hi, l->b) <= s->near || box_outside(l, n->lo, n->hi))
 			continue;
@@ -161,11 +161,11 @@ static int collect(struct sight_line *l)
 			continue;
 		}
 		for (uint32_t i = n->first; i < n->first + n->count; i++) {
-			const struct body *b = &s->body[i];
+			const struct occluder_body *b = &s->body[i];
 			if (apart(l, b->lo, b->hi))
 				continue;
 			if (!l->planes)
-				l->planes = shaft_planes(l->a, l->b, s->near, l->shaft);
+				l->planes = occ_shaft_planes(l->a, l->b, s->near, l->shaft);
 			if (box_outside(l, b->lo, b->hi) || behind_facet(s, b, l->a) ||
 			    behind_facet(s, b, l->b) || (holds(s, b, l->a) && holds(s, b, l->b)) ||
 			    outside_shaft(l, b))
@@ -179,26 +179,26 @@ static int collect(struct sight_line *l)
 }
 
 /* Does one of the bodies hide everything? */
-static int one_hides(const struct sight_line *l)
+static int one_hides(const struct shaft *l)
 {
-	struct blocker b;
+	struct occluder b;
 
 	for (int i = 0; i < l->bodies; i++)
-		if (blocker_make(l->set, l->body[i], l->b, &b) &&
-		    blocker_hides(&b, l->a, l->b, l->set->near))
+		if (occ_occluder_make(l->set, l->body[i], l->b, &b) &&
+		    occ_occluder_hides(&b, l->a, l->b, l->set->near))
 			return 1;
 	return 0;
 }
 
-enum sight sight_find(struct sight_line *l, const struct body_set *set, const struct facet *a,
-                      const struct facet *b)
+enum shaft_state occ_shaft_cull(struct shaft *l, const struct occluder_set *set, const struct facet *a,
+                          const struct facet *b)
 {
 	l->set = set;
 	l->a = a;
 	l->b = b;
 	l->planes = l->bodies = 0;
 	if (!set->nodes)
-		return SIGHT_CLEAR;
+		return SHAFT_CLEAR;
 	for (int k = 0; k < 3; k++) {
 		l->lo[k] = INFINITY;
 		l->hi[k] = -INFINITY;
@@ -207,6 +207,6 @@ enum sight sight_find(struct sight_line *l, const struct body_set *set, const st
 	grow_box(l, b);
 	int all = collect(l);
 	if (one_hides(l))
-		return SIGHT_NONE;
-	return !all ? SIGHT_CROWDED : l->bodies ? SIGHT_PART : SIGHT_CLEAR;
+		return SHAFT_HIDDEN;
+	return !all ? SHAFT_CROWDED : l->bodies ? SHAFT_PARTLY : SHAFT_CLEAR;
 }

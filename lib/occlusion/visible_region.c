@@ -12,7 +12,7 @@ enum { OVERLAPS = 3 };
 /* Heights are rounded to this, by the size of what is multiplied. What is seen, too. */
 static const double rounding = 1e-14;
 
-void seer_begin(struct seer *s, int blockers, double near)
+void occ_visible_begin(struct visible_point *s, int blockers, double near)
 {
 	s->near = near;
 	for (int i = 0; i < blockers; i++)
@@ -22,22 +22,22 @@ void seer_begin(struct seer *s, int blockers, double near)
 /* ---- silhouettes ---- */
 
 /* Bits of the faces that the eye is in front of; bit 1 for a flat blocker seen from behind. */
-static uint64_t faces_in_front(const struct blocker *b, const double x[3], double near)
+static uint64_t faces_in_front(const struct occluder *b, const double x[3], double near)
 {
 	uint64_t front = 0;
 
 	if (b->flat) {
-		double h = plane_height(&b->face[0], x);
+		double h = occ_plane_height(&b->face[0], x);
 		return h > 0 ? 1 : h < 0 ? 2 : 0;
 	}
 	for (int i = 0; i < b->faces; i++)
-		front |= (uint64_t)(plane_height(&b->face[i], x) > near * 1e-6) << i;
+		front |= (uint64_t)(occ_plane_height(&b->face[i], x) > near * 1e-6) << i;
 	return front;
 }
 
 /* A direction from an edge in which an eye has one of its faces in front of it and the
  * other not. */
-static void towards_eye(const struct blocker *b, int edge, uint64_t front, double to[3])
+static void towards_eye(const struct occluder *b, int edge, uint64_t front, double to[3])
 {
 	int left = b->edge[edge].left, right = b->edge[edge].right;
 	const double *seen = b->face[front >> left & 1 ? left : right].normal;
@@ -48,7 +48,7 @@ static void towards_eye(const struct blocker *b, int edge, uint64_t front, doubl
 }
 
 /* Appends an edge, so that the blocker is inside. */
-static void put_edge(struct outline *o, const struct blocker *b, int edge)
+static void put_edge(struct outline *o, const struct occluder *b, int edge)
 {
 	double to[3], d[3], across[3], inwards[3];
 
@@ -65,7 +65,7 @@ static void put_edge(struct outline *o, const struct blocker *b, int edge)
 }
 
 /* 0 if it has too many edges. */
-static int find_outline(struct outline *o, const struct blocker *b, uint64_t front)
+static int find_outline(struct outline *o, const struct occluder *b, uint64_t front)
 {
 	o->front = front;
 	o->edges = 0;
@@ -102,9 +102,9 @@ static void find_planes(const struct outline *o, const double x[3], struct outli
 
 /* The planes of a blocker for the eye in work. -1 if the eye is in it, 0 if it is seen
  * edge-on. */
-static int know_planes(struct seer *s, int blocker, const double x[3])
+static int know_planes(struct visible_point *s, int blocker, const double x[3])
 {
-	const struct blocker *b = &s->blocker[blocker];
+	const struct occluder *b = &s->occluder[blocker];
 	struct outline *o = &s->outline[blocker];
 	uint64_t front = faces_in_front(b, x, s->near);
 
@@ -122,7 +122,7 @@ static int know_planes(struct seer *s, int blocker, const double x[3])
 
 /* What of a polygon is in front of planes through the eye: bit 0 of a height of one of its
  * corners above `zero`, bit 1 below. */
-static int sides_of(const struct eye_polygon *p, const double n[3], double zero)
+static int sides_of(const struct point_polygon *p, const double n[3], double zero)
 {
 	int above = 0, below = 0;
 
@@ -134,7 +134,7 @@ static int sides_of(const struct eye_polygon *p, const double n[3], double zero)
 	return (above != 0) | (below != 0) << 1;
 }
 
-static void plane_of(const struct seer *s, int blocker, int edge, double n[3], double *zero)
+static void plane_of(const struct visible_point *s, int blocker, int edge, double n[3], double *zero)
 {
 	const struct outline_planes *p = &s->planes[blocker];
 
@@ -144,7 +144,7 @@ static void plane_of(const struct seer *s, int blocker, int edge, double n[3], d
 
 /* Does a blocker hide nothing of a polygon, as it is all beyond an edge? Else a bit in
  * *across for each edge that cuts it. */
-static int apart(const struct seer *s, int blocker, const struct eye_polygon *p, uint64_t *across)
+static int apart(const struct visible_point *s, int blocker, const struct point_polygon *p, uint64_t *across)
 {
 	*across = 0;
 	for (int i = 0; i < s->outline[blocker].edges; i++) {
@@ -158,26 +158,26 @@ static int apart(const struct seer *s, int blocker, const struct eye_polygon *p,
 	return 0;
 }
 
-static int cut(struct seer *s, int blocker, uint64_t edges, const struct eye_polygon *p,
-               struct eye_polygon *in, struct eye_polygon *away)
+static int cut(struct visible_point *s, int blocker, uint64_t edges, const struct point_polygon *p,
+               struct point_polygon *in, struct point_polygon *away)
 {
 	double n[3], zero;
 
 	plane_of(s, blocker, __builtin_ctzll(edges), n, &zero);
-	s->full |= p->n >= EYE_CORNERS;
+	s->full |= p->n >= POINT_POLYGON_CORNERS;
 	if (s->full)
 		in->n = away->n = 0;
 	else
-		eye_polygon_cut(p, n, zero, in, away);
+		geo_point_polygon_cut(p, n, zero, in, away);
 	return in->n;
 }
 
 /* What a blocker hides of a polygon that the edges of set bits cut: of `part`, or NULL. */
-static const struct eye_polygon *hidden_part(struct seer *s, int blocker, uint64_t edges,
-                                             const struct eye_polygon *p,
-                                             struct eye_polygon part[2])
+static const struct point_polygon *hidden_part(struct visible_point *s, int blocker, uint64_t edges,
+                                               const struct point_polygon *p,
+                                               struct point_polygon part[2])
 {
-	struct eye_polygon away;
+	struct point_polygon away;
 	int k = 0;
 
 	for (; edges; edges &= edges - 1, p = &part[k], k = !k)
@@ -186,14 +186,14 @@ static const struct eye_polygon *hidden_part(struct seer *s, int blocker, uint64
 	return p;
 }
 
-static double visible(struct seer *s, const struct eye_polygon *p, const uint8_t *blockers, int n);
+static double visible(struct visible_point *s, const struct point_polygon *p, const uint8_t *blockers, int n);
 
 /* What is visible of a polygon that many blockers hide parts of: what the last one leaves,
  * piece by piece. */
-static double piecewise(struct seer *s, const struct eye_polygon *p, uint64_t edges,
+static double piecewise(struct visible_point *s, const struct point_polygon *p, uint64_t edges,
                         const uint8_t *blockers, int n)
 {
-	struct eye_polygon part[2], away;
+	struct point_polygon part[2], away;
 	double sum = 0;
 
 	for (int k = 0; edges && p->n; edges &= edges - 1, p = &part[k], k = !k) {
@@ -205,12 +205,12 @@ static double piecewise(struct seer *s, const struct eye_polygon *p, uint64_t ed
 }
 
 /* The form factor of what the blockers leave of a polygon. */
-static double visible(struct seer *s, const struct eye_polygon *p, const uint8_t *blockers, int n)
+static double visible(struct visible_point *s, const struct point_polygon *p, const uint8_t *blockers, int n)
 {
-	uint8_t left[SIGHT_BLOCKERS];
-	uint64_t across[SIGHT_BLOCKERS];
-	struct eye_polygon part[2];
-	const struct eye_polygon *hidden;
+	uint8_t left[SHAFT_OCCLUDERS];
+	uint64_t across[SHAFT_OCCLUDERS];
+	struct point_polygon part[2];
+	const struct point_polygon *hidden;
 	int m = 0;
 
 	for (int i = 0; i < n; i++) {
@@ -238,16 +238,16 @@ static double visible(struct seer *s, const struct eye_polygon *p, const uint8_t
 	return sum > rounding * whole ? sum : 0;
 }
 
-static double look(struct seer *s, const double x[3], const struct facet *g, uint64_t blockers,
+static double look(struct visible_point *s, const double x[3], const struct facet *g, uint64_t blockers,
                    struct err *e)
 {
-	struct eye_polygon whole;
-	uint8_t list[SIGHT_BLOCKERS];
+	struct point_polygon whole;
+	uint8_t list[SHAFT_OCCLUDERS];
 	int n = 0;
 
 	s->evaluations++;
 	s->full = 0;
-	eye_polygon_make(&whole, x, g->n, g->v);
+	geo_point_polygon_make(&whole, x, g->n, g->v);
 	s->reach = 0;
 	for (int i = 0; i < whole.n; i++)
 		s->reach = fmax(s->reach, fabs(whole.x[i]) + fabs(whole.y[i]) + fabs(whole.z[i]));
@@ -267,13 +267,13 @@ static double look(struct seer *s, const double x[3], const struct facet *g, uin
 	return NAN;
 }
 
-static double factor(const struct eye_polygon *p, void *normal)
+static double factor(const struct point_polygon *p, void *normal)
 {
-	return eye_polygon_factor(p, normal);
+	return geo_point_polygon_factor(p, normal);
 }
 
-double seen(struct seer *s, const double x[3], const double normal[3], const struct facet *g,
-            uint64_t blockers, struct err *e)
+double occ_visible_exchange(struct visible_point *s, const double x[3], const double normal[3], const struct facet *g,
+                            uint64_t blockers, struct err *e)
 {
 	double n[3] = { normal[0], normal[1], normal[2] };
 
@@ -283,8 +283,8 @@ double seen(struct seer *s, const double x[3], const double normal[3], const str
 	return look(s, x, g, blockers, e);
 }
 
-double seen_measured(struct seer *s, const double x[3], const struct facet *g, uint64_t blockers,
-                     seen_measure measure, void *arg, struct err *e)
+double occ_visible_integrate(struct visible_point *s, const double x[3], const struct facet *g, uint64_t blockers,
+                             visible_measure measure, void *arg, struct err *e)
 {
 	s->measure = measure;
 	s->arg = arg;

@@ -23,35 +23,35 @@ struct outline_planes {
 };
 
 /* Something additive of polygons that an eye sees. */
-typedef double (*seen_measure)(const struct eye_polygon *p, void *arg);
+typedef double (*visible_measure)(const struct point_polygon *p, void *arg);
 
 /* One thread's scratch space and the blockers. */
-struct seer {
-	struct blocker blocker[SIGHT_BLOCKERS];
+struct visible_point {
+	struct occluder occluder[SHAFT_OCCLUDERS];
 	double near;                  /* of the body set */
 	int hid;                      /* set when a blocker hides something */
 	double evaluations;           /* so far */
 	/* The eye in work. */
 	double reach;                 /* of the farthest corner of what is looked at */
-	seen_measure measure;
+	visible_measure measure;
 	void *arg;
 	int overlaps;                 /* see visible_region.c */
 	int full;                     /* a polygon has too many corners */
-	struct outline outline[SIGHT_BLOCKERS];
-	struct outline_planes planes[SIGHT_BLOCKERS];
+	struct outline outline[SHAFT_OCCLUDERS];
+	struct outline_planes planes[SHAFT_OCCLUDERS];
 };
 
 /* To be called when blockers have changed. */
-void seer_begin(struct seer *s, int blockers, double near);
+void occ_visible_begin(struct visible_point *s, int blockers, double near);
 
 /* The form factor from a point x with a unit normal to what it sees of facet g, which is
  * in front of it; exact. blockers: a bit for each that may hide something. NaN and e when
  * polygons have too many corners. */
-double seen(struct seer *s, const double x[3], const double normal[3], const struct facet *g,
-            uint64_t blockers, struct err *e);
+double occ_visible_exchange(struct visible_point *s, const double x[3], const double normal[3], const struct facet *g,
+                            uint64_t blockers, struct err *e);
 
 /* The same for any measure: its sum over convex polygons that are together what is seen. */
-double seen_measured(struct seer *s, const double x[3], const struct facet *g, uint64_t blockers,
-                     seen_measure measure, void *arg, struct err *e);
+double occ_visible_integrate(struct visible_point *s, const double x[3], const struct facet *g, uint64_t blockers,
+                             visible_measure measure, void *arg, struct err *e);
 
 #endif

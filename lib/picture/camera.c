@@ -18,7 +18,7 @@ static int parse_extent(const char *text, char **end, int *n)
 	return 0;
 }
 
-int camera_parse_size(const char *text, int *width, int *height)
+int picture_camera_parse_size(const char *text, int *width, int *height)
 {
 	char *end;
 	int w, h;
@@ -48,7 +48,7 @@ static int no_such_camera(const struct model *m, const char *name, struct err *e
 	               at < sizeof list ? "" : "...");
 }
 
-int camera_find(const struct model *m, const char *name, struct err *e)
+int picture_camera_find(const struct model *m, const char *name, struct err *e)
 {
 	for (size_t i = 0; name && i < m->cameras; i++)
 		if (strcmp(m->camera[i].name, name) == 0)
@@ -62,8 +62,8 @@ static double aspect_of(const struct camera *c)
 	return a > 0 && isfinite(a) ? a : CAMERA_ASPECT;
 }
 
-int camera_frame(const struct camera *c, int width, int height, struct view_frame *f,
-                 struct err *e)
+int picture_camera_frame(const struct camera *c, int width, int height, struct view_frame *f,
+                         struct err *e)
 {
 	if (width <= 0)
 		width = CAMERA_WIDTH;
@@ -92,8 +92,8 @@ int camera_frame(const struct camera *c, int width, int height, struct view_fram
 	return 0;
 }
 
-void camera_ray(const struct view_frame *f, double x, double y, double org[3],
-                double dir[3])
+void picture_camera_ray(const struct view_frame *f, double x, double y, double org[3],
+                        double dir[3])
 {
 	double sx = x * f->step_x - f->half_x, sy = f->half_y - y * f->step_y;
 	double across[3];
@@ -113,14 +113,14 @@ void camera_ray(const struct view_frame *f, double x, double y, double org[3],
 	}
 }
 
-double camera_depth(const struct view_frame *f, const double point[3])
+double picture_camera_depth(const struct view_frame *f, const double point[3])
 {
 	double d[3];
 	v3_sub(point, f->eye, d);
 	return v3_dot(d, f->forward);
 }
 
-void camera_world_to_camera(const struct view_frame *f, float matrix[16])
+void picture_camera_world_to_camera(const struct view_frame *f, float matrix[16])
 {
 	const double *axis[3] = { f->right, f->up, f->forward };
 
@@ -133,8 +133,8 @@ void camera_world_to_camera(const struct view_frame *f, float matrix[16])
 	matrix[15] = 1;
 }
 
-int camera_look_at(const double eye[3], const double target[3], const double up[3],
-                   double fov_degrees, struct camera *c, struct err *e)
+int picture_camera_look_at(const double eye[3], const double target[3], const double up[3],
+                           double fov_degrees, struct camera *c, struct err *e)
 {
 	double back[3], right[3], upright[3];
 	double degree = acos(-1) / 180;

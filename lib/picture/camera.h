@@ -24,36 +24,36 @@ struct view_frame {
 
 /* Parses "WxH". 0, or -1 when text is anything else or a number is not in
  * [1, CAMERA_SIZE_MAX]. */
-int camera_parse_size(const char *text, int *width, int *height);
+int picture_camera_parse_size(const char *text, int *width, int *height);
 
 /* Index of the camera called `name` in m, or -1 and e, which lists those there are
  * (with a NULL name, asking for one of them). */
-int camera_find(const struct model *m, const char *name, struct err *e);
+int picture_camera_find(const struct model *m, const char *name, struct err *e);
 
 /* Sets up c's view of width x height pixels; 0 for width means CAMERA_WIDTH, 0 for
  * height the one that the camera's aspect gives. 0, or -1 and e. */
-int camera_frame(const struct camera *c, int width, int height, struct view_frame *f,
-                 struct err *e);
+int picture_camera_frame(const struct camera *c, int width, int height, struct view_frame *f,
+                         struct err *e);
 
 /* The ray through picture coordinates (x, y): x from 0 (left edge) to width, y from
  * 0 (top edge) to height, so the centre of pixel (i, j) is (i + .5, j + .5). dir is
  * a unit vector. Perspective rays begin in the eye, orthographic ones in the plane
  * through it. */
-void camera_ray(const struct view_frame *f, double x, double y, double org[3],
-                double dir[3]);
+void picture_camera_ray(const struct view_frame *f, double x, double y, double org[3],
+                        double dir[3]);
 
 /* Depth Z of a world point: its distance from the eye's plane along the viewing
  * direction, positive in front. */
-double camera_depth(const struct view_frame *f, const double point[3]);
+double picture_camera_depth(const struct view_frame *f, const double point[3]);
 
 /* OpenEXR's worldToCamera: row vectors times this row-major matrix give camera
  * coordinates, x to the right, y up, z in the viewing direction (left-handed). */
-void camera_world_to_camera(const struct view_frame *f, float matrix[16]);
+void picture_camera_world_to_camera(const struct view_frame *f, float matrix[16]);
 
 /* A perspective camera at eye, looking at target, with `up` upright and a vertical
  * field of view in degrees. Its name is NULL, its aspect not given. 0, or -1 and e
  * when the directions do not make a view. */
-int camera_look_at(const double eye[3], const double target[3], const double up[3],
-                   double fov_degrees, struct camera *c, struct err *e);
+int picture_camera_look_at(const double eye[3], const double target[3], const double up[3],
+                           double fov_degrees, struct camera *c, struct err *e);
 
 #endif

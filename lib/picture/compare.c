@@ -5,7 +5,7 @@
 
 #include "lib/base/mem.h"
 
-const int compare_percentile[COMPARE_PERCENTILES] = { 50, 95, 99 };
+const int picture_compare_percentile[COMPARE_PERCENTILES] = { 50, 95, 99 };
 
 struct sums {
 	double a, b, squares;
@@ -30,13 +30,13 @@ static int add_pixel(const struct pair *p, size_t at, struct sums *s, double *wo
 	double off = 0, size = 0;
 
 	for (int c = 0; c < p->n; c++)
-		if (!isfinite(image_plane(p->a, p->channel_a[c])[at]) ||
-		    !isfinite(image_plane(p->b, p->channel_b[c])[at]))
+		if (!isfinite(picture_image_plane(p->a, p->channel_a[c])[at]) ||
+		    !isfinite(picture_image_plane(p->b, p->channel_b[c])[at]))
 			return 0;
 	*worst = 0;
 	for (int c = 0; c < p->n; c++) {
-		double x = image_plane(p->a, p->channel_a[c])[at];
-		double y = image_plane(p->b, p->channel_b[c])[at];
+		double x = picture_image_plane(p->a, p->channel_a[c])[at];
+		double y = picture_image_plane(p->b, p->channel_b[c])[at];
 
 		s->a += x;
 		s->b += y;
@@ -60,7 +60,7 @@ static void rank(float *error, struct compare *out)
 {
 	qsort(error, out->pixels, sizeof *error, by_size);
 	for (int i = 0; i < COMPARE_PERCENTILES; i++) {
-		size_t at = (out->pixels * (size_t)compare_percentile[i] + 99) / 100;
+		size_t at = (out->pixels * (size_t)picture_compare_percentile[i] + 99) / 100;
 		out->percentile[i] = (double)error[at > 0 ? at - 1 : 0];
 	}
 }
@@ -94,9 +94,9 @@ static void add_row(const struct pair *p, int y, const unsigned char *mask, floa
 	total->squares += row.squares;
 }
 
-int compare_channels(const struct image *a, const int *channel_a, const struct image *b,
-                     const int *channel_b, int n, const unsigned char *mask,
-                     struct compare *out, struct err *e)
+int picture_compare_channels(const struct image *a, const int *channel_a, const struct image *b,
+                             const int *channel_b, int n, const unsigned char *mask,
+                             struct compare *out, struct err *e)
 {
 	struct pair p = { a, b, channel_a, channel_b, n };
 	size_t pixels = (size_t)a->width * (size_t)a->height;
@@ -122,31 +122,31 @@ int compare_channels(const struct image *a, const int *channel_a, const struct i
 	return 0;
 }
 
-int compare_mask_emitters(const struct image *im, unsigned char *mask)
+int picture_compare_mask_emitters(const struct image *im, unsigned char *mask)
 {
 	size_t pixels = (size_t)im->width * (size_t)im->height;
-	int channel[3], n = image_layer(im, "emission", channel);
+	int channel[3], n = picture_image_layer(im, "emission", channel);
 
 	for (int c = 0; c < n; c++)
 		for (size_t i = 0; i < pixels; i++)
-			mask[i] = mask[i] || image_plane(im, channel[c])[i] != 0;
+			mask[i] = mask[i] || picture_image_plane(im, channel[c])[i] != 0;
 	return n ? 0 : -1;
 }
 
-int compare_mask_nothing(const struct image *im, unsigned char *mask)
+int picture_compare_mask_nothing(const struct image *im, unsigned char *mask)
 {
 	size_t pixels = (size_t)im->width * (size_t)im->height;
-	int element = image_channel(im, "element"), z = image_channel(im, "Z");
+	int element = picture_image_channel(im, "element"), z = picture_image_channel(im, "Z");
 
 	for (size_t i = 0; i < pixels && element >= 0; i++)
-		mask[i] = mask[i] || image_plane(im, element)[i] < 0;
+		mask[i] = mask[i] || picture_image_plane(im, element)[i] < 0;
 	for (size_t i = 0; i < pixels && z >= 0; i++)
-		mask[i] = mask[i] || isinf(image_plane(im, z)[i]);
+		mask[i] = mask[i] || isinf(picture_image_plane(im, z)[i]);
 	return element >= 0 || z >= 0 ? 0 : -1;
 }
 
-int compare_difference(const struct image *a, const int *channel_a, const struct image *b,
-                       const int *channel_b, int n, struct image *out, struct err *e)
+int picture_compare_difference(const struct image *a, const int *channel_a, const struct image *b,
+                               const int *channel_b, int n, struct image *out, struct err *e)
 {
 	const char **name = mem_new((size_t)n, sizeof *name, "channel names", e);
 	size_t pixels = (size_t)a->width * (size_t)a->height;
@@ -156,12 +156,12 @@ int compare_difference(const struct image *a, const int *channel_a, const struct
 		return -1;
 	for (int c = 0; c < n; c++)
 		name[c] = a->name[channel_a[c]];
-	status = image_new(out, a->width, a->height, n, name, e);
+	status = picture_image_new(out, a->width, a->height, n, name, e);
 	for (int c = 0; c < n && status == 0; c++) {
-		const float *x = image_plane(a, channel_a[c]), *y = image_plane(b, channel_b[c]);
+		const float *x = picture_image_plane(a, channel_a[c]), *y = picture_image_plane(b, channel_b[c]);
 
 		for (size_t i = 0; i < pixels; i++)
-			image_plane(out, c)[i] = x[i] - y[i];
+			picture_image_plane(out, c)[i] = x[i] - y[i];
 	}
 	free(name);
 	return status;

@@ -9,7 +9,7 @@
 
 /* The relative errors of pixels that are kept: 50, 95 and 99 % of pixels have no more. */
 enum { COMPARE_PERCENTILES = 3 };
-extern const int compare_percentile[COMPARE_PERCENTILES];
+extern const int picture_compare_percentile[COMPARE_PERCENTILES];
 
 /* Over the pixels that are not left out and finite in all compared channels of both
  * pictures; every channel of such a pixel is one value of the means. The relative error
@@ -30,18 +30,18 @@ struct compare {
 /* Compares n channels of a with n of b. The pictures have the same size. mask: a byte
  * for each pixel, other than 0 where it is left out; or NULL. O(pixels log pixels). 0, or
  * -1 and e when memory is short. */
-int compare_channels(const struct image *a, const int *channel_a, const struct image *b,
-                     const int *channel_b, int n, const unsigned char *mask,
-                     struct compare *out, struct err *e);
+int picture_compare_channels(const struct image *a, const int *channel_a, const struct image *b,
+                             const int *channel_b, int n, const unsigned char *mask,
+                             struct compare *out, struct err *e);
 
 /* Sets the mask where a picture shows an emitter: any channel of its layer `emission` is
  * not 0. Or where it shows nothing: `element` is negative, or Z infinite. 0, or -1 if it
  * has no such channels. */
-int compare_mask_emitters(const struct image *im, unsigned char *mask);
-int compare_mask_nothing(const struct image *im, unsigned char *mask);
+int picture_compare_mask_emitters(const struct image *im, unsigned char *mask);
+int picture_compare_mask_nothing(const struct image *im, unsigned char *mask);
 
 /* The picture a - b of these channels, with a's names. 0, or -1 and e. */
-int compare_difference(const struct image *a, const int *channel_a, const struct image *b,
-                       const int *channel_b, int n, struct image *out, struct err *e);
+int picture_compare_difference(const struct image *a, const int *channel_a, const struct image *b,
+                               const int *channel_b, int n, struct image *out, struct err *e);
 
 #endif

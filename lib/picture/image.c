@@ -6,8 +6,8 @@
 
 #include "lib/base/mem.h"
 
-int image_new(struct image *im, int width, int height, int channels,
-              const char *const *name, struct err *e)
+int picture_image_new(struct image *im, int width, int height, int channels,
+                      const char *const *name, struct err *e)
 {
 	*im = (struct image){ .width = width, .height = height };
 	if (width < 1 || height < 1 || channels < 1)
@@ -30,11 +30,11 @@ int image_new(struct image *im, int width, int height, int channels,
 	}
 	return 0;
 fail:
-	image_free(im);
+	picture_image_free(im);
 	return -1;
 }
 
-void image_free(struct image *im)
+void picture_image_free(struct image *im)
 {
 	for (int c = 0; c < im->channels; c++)
 		free(im->name[c]);
@@ -43,7 +43,7 @@ void image_free(struct image *im)
 	*im = (struct image){ 0 };
 }
 
-int image_channel(const struct image *im, const char *name)
+int picture_image_channel(const struct image *im, const char *name)
 {
 	for (int c = 0; c < im->channels; c++)
 		if (strcmp(im->name[c], name) == 0)
@@ -59,20 +59,20 @@ static int layer_of(const struct image *im, const char *layer, const char *lette
 	for (int i = 0; i < 3; i++) {
 		snprintf(name, sizeof name, "%s%s%c", layer ? layer : "", layer ? "." : "",
 		         letters[i]);
-		channel[i] = image_channel(im, name);
+		channel[i] = picture_image_channel(im, name);
 		if (channel[i] < 0)
 			return 0;
 	}
 	return 3;
 }
 
-int image_layer(const struct image *im, const char *layer, int channel[3])
+int picture_image_layer(const struct image *im, const char *layer, int channel[3])
 {
 	int single;
 
 	if (layer_of(im, layer, "RGB", channel) || layer_of(im, layer, "XYZ", channel))
 		return 3;
-	single = image_channel(im, layer ? layer : "Y");
+	single = picture_image_channel(im, layer ? layer : "Y");
 	for (int i = 0; i < 3; i++)
 		channel[i] = single;
 	return single < 0 ? 0 : 1;

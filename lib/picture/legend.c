@@ -114,11 +114,11 @@ static void draw_legend(struct canvas *c, int x, int dot, const struct tone_scal
 
 	fill(c, x - dot, top - dot, bar + 2 * dot, bottom - top + 2 * dot, white);
 	for (int y = top; y < bottom; y++) {
-		tonemap_colour((bottom - 1 - y) / (double)(bottom - 1 - top), rgb);
+		picture_tonemap_colour((bottom - 1 - y) / (double)(bottom - 1 - top), rgb);
 		fill(c, x, y, bar, 1, rgb);
 	}
 	for (int i = 0; i < ticks; i++) {
-		double t = tonemap_position(s, tick[i]);
+		double t = picture_tonemap_position(s, tick[i]);
 		int y = bottom - 1 - (int)lround(t * (bottom - 1 - top));
 
 		fill(c, x + bar + dot, y - dot / 2, 3 * dot, dot, white);
@@ -127,7 +127,7 @@ static void draw_legend(struct canvas *c, int x, int dot, const struct tone_scal
 	}
 }
 
-int legend_append(struct canvas *c, const struct tone_scale *s, struct err *e)
+int picture_legend_append(struct canvas *c, const struct tone_scale *s, struct err *e)
 {
 	int height = c->height < ROWS_MIN ? ROWS_MIN : c->height;
 	int dot = 1 + height / 500, characters = 0;
@@ -141,14 +141,14 @@ int legend_append(struct canvas *c, const struct tone_scale *s, struct err *e)
 
 		characters = n > characters ? n : characters;
 	}
-	if (canvas_new(&wide, c->width + (27 + characters * (GLYPH_WIDTH + 1)) * dot, height, e))
+	if (picture_canvas_new(&wide, c->width + (27 + characters * (GLYPH_WIDTH + 1)) * dot, height, e))
 		return -1;
 	for (int y = 0; y < c->height; y++)
 		memcpy(wide.rgb + 3 * (size_t)y * (size_t)wide.width,
 		       c->rgb + 3 * (size_t)y * (size_t)c->width,
 		       3 * (size_t)c->width * sizeof *c->rgb);
 	draw_legend(&wide, c->width + 6 * dot, dot, s, tick, ticks);
-	canvas_free(c);
+	picture_canvas_free(c);
 	*c = wide;
 	return 0;
 }

@@ -12,7 +12,7 @@ static const float magenta[3] = { 1, 0, 1 };
 
 /* ---- canvas ---- */
 
-int canvas_new(struct canvas *c, int width, int height, struct err *e)
+int picture_canvas_new(struct canvas *c, int width, int height, struct err *e)
 {
 	*c = (struct canvas){ .width = width, .height = height };
 	c->rgb = mem_new((size_t)width * (size_t)height, 3 * sizeof *c->rgb,
@@ -20,13 +20,13 @@ int canvas_new(struct canvas *c, int width, int height, struct err *e)
 	return c->rgb ? 0 : -1;
 }
 
-void canvas_free(struct canvas *c)
+void picture_canvas_free(struct canvas *c)
 {
 	free(c->rgb);
 	*c = (struct canvas){ 0 };
 }
 
-void canvas_quantise(const struct canvas *c, int bits, void *out)
+void picture_canvas_quantise(const struct canvas *c, int bits, void *out)
 {
 	size_t n = 3 * (size_t)c->width * (size_t)c->height;
 	uint8_t *bytes = out;
@@ -46,7 +46,7 @@ void canvas_quantise(const struct canvas *c, int bits, void *out)
 static int pixel(const struct image *im, const int channel[3], size_t at, double rgb[3])
 {
 	for (int i = 0; i < 3; i++)
-		rgb[i] = (double)image_plane(im, channel[i])[at];
+		rgb[i] = (double)picture_image_plane(im, channel[i])[at];
 	return isfinite(rgb[0]) && isfinite(rgb[1]) && isfinite(rgb[2]);
 }
 
@@ -105,7 +105,7 @@ static double percentile(const struct histogram *h, double part)
 	return 1;
 }
 
-double tonemap_exposure(const struct image *im, const int channel[3], size_t *lit)
+double picture_tonemap_exposure(const struct image *im, const int channel[3], size_t *lit)
 {
 	struct histogram *h = histogram_new(im, channel);
 	double below = 0, sum = 0, weight = 0;
@@ -141,8 +141,8 @@ static void put(struct canvas *c, size_t at, const float rgb[3])
 		c->rgb[3 * at + (size_t)i] = rgb[i];
 }
 
-size_t tonemap_curve(const struct image *im, const int channel[3],
-                     const struct tone_curve *curve, struct canvas *c)
+size_t picture_tonemap_curve(const struct image *im, const int channel[3],
+                             const struct tone_curve *curve, struct canvas *c)
 {
 	size_t pixels = (size_t)im->width * (size_t)im->height, odd = 0;
 	double gain = exp2(curve->exposure), white = curve->white, rgb[3];
@@ -170,7 +170,7 @@ size_t tonemap_curve(const struct image *im, const int channel[3],
 
 /* ---- false colour ---- */
 
-void tonemap_colour(double t, float rgb[3])
+void picture_tonemap_colour(double t, float rgb[3])
 {
 	static const double start = .5, rotations = -1.5, hue = 1.2;
 	double angle = 2 * pi * (start / 3 + 1 + rotations * t);
@@ -181,7 +181,7 @@ void tonemap_colour(double t, float rgb[3])
 	rgb[2] = (float)fmin(1, fmax(0, t + 1.97294 * x));
 }
 
-double tonemap_position(const struct tone_scale *s, double value)
+double picture_tonemap_position(const struct tone_scale *s, double value)
 {
 	if (value <= s->min)
 		return 0;
@@ -211,8 +211,8 @@ static double round_number(double x, int up)
 	return up ? 10 * power : below;
 }
 
-int tonemap_scale(const struct image *im, const int channel[3], struct tone_scale *s,
-                  struct err *e)
+int picture_tonemap_scale(const struct image *im, const int channel[3], struct tone_scale *s,
+                          struct err *e)
 {
 	struct histogram *h = histogram_new(im, channel);
 	int choose_min = isnan(s->min);
@@ -241,8 +241,8 @@ int tonemap_scale(const struct image *im, const int channel[3], struct tone_scal
 	return 0;
 }
 
-size_t tonemap_false_colour(const struct image *im, const int channel[3],
-                            const struct tone_scale *s, struct canvas *c)
+size_t picture_tonemap_false_colour(const struct image *im, const int channel[3],
+                                    const struct tone_scale *s, struct canvas *c)
 {
 	size_t pixels = (size_t)im->width * (size_t)im->height, odd = 0;
 	double rgb[3];
@@ -254,7 +254,7 @@ size_t tonemap_false_colour(const struct image *im, const int channel[3],
 			odd++;
 			continue;
 		}
-		tonemap_colour(tonemap_position(s, luminance(channel, rgb)), shown);
+		picture_tonemap_colour(picture_tonemap_position(s, luminance(channel, rgb)), shown);
 		put(c, i, shown);
 	}
 	return odd;

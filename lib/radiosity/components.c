@@ -31,7 +31,7 @@ static void join(uint32_t *of, uint32_t a, uint32_t b)
 static int passes(const struct model *m, uint32_t patch)
 {
 	const struct materials *mt = &m->material;
-	size_t at = material_at(mt, model_patch_material(m, patch), 0);
+	size_t at = model_material_at(mt, model_patch_material(m, patch), 0);
 
 	for (int k = 0; k < 2 * mt->bands; k++)
 		if (mt->tau_d[at + (size_t)k] > 0 || mt->tau_s[at + (size_t)k] > 0)
@@ -39,7 +39,7 @@ static int passes(const struct model *m, uint32_t patch)
 	return 0;
 }
 
-int components_init(struct components *c, const struct transport *t, struct err *e)
+int radiosity_components_init(struct components *c, const struct transport *t, struct err *e)
 {
 	uint32_t sides = model_sources(t->m);
 
@@ -48,7 +48,7 @@ int components_init(struct components *c, const struct transport *t, struct err 
 		return -1;
 	for (uint32_t i = 0; i < sides; i++)
 		c->of[i] = i;
-	for (uint32_t p = 0; p < t->m->patches; p++)
+	for (uint32_t p = 0; p < t->m->patch.n; p++)
 		if (passes(t->m, p))
 			join(c->of, 2 * p, 2 * p + 1);
 	for (size_t r = 0; r < t->rows; r++)
@@ -63,7 +63,7 @@ int components_init(struct components *c, const struct transport *t, struct err 
 	return 0;
 }
 
-void components_free(struct components *c)
+void radiosity_components_free(struct components *c)
 {
 	free(c->of);
 	*c = (struct components){ 0 };
@@ -86,7 +86,7 @@ static int any_row_of(struct ends *x, uint32_t ps, row_test *test)
 {
 	const struct transport *t = x->t;
 	const struct materials *mt = &t->m->material;
-	size_t at = material_at(mt, model_patch_material(t->m, ps >> 1), (int)(ps & 1)) +
+	size_t at = model_material_at(mt, model_patch_material(t->m, ps >> 1), (int)(ps & 1)) +
 	            (size_t)x->band;
 	int found = 0;
 
@@ -146,7 +146,7 @@ static void start_at_emitters(struct ends *x)
 {
 	const struct transport *t = x->t;
 
-	for (uint32_t ps = 0; ps < 2 * t->m->patches; ps++) {
+	for (uint32_t ps = 0; ps < 2 * t->m->patch.n; ps++) {
 		uint32_t row = t->emission_row[ps] != FF_NO_ROW ? t->emission_row[ps]
 		                                                : t->diffuse_row[ps];
 		if (row != FF_NO_ROW &&
@@ -155,14 +155,14 @@ static void start_at_emitters(struct ends *x)
 			x->reached[row] = 1;
 	}
 	for (size_t i = 0; i < t->m->light.n; i++)
-		if (t->light_row[i] != FF_NO_ROW && light_flux(t->m, i, x->band) > 0)
+		if (t->light_row[i] != FF_NO_ROW && model_light_flux(t->m, i, x->band) > 0)
 			x->reached[t->light_row[i]] = 1;
 }
 
 static const char *source_name(const struct model *m, uint32_t source)
 {
-	return source < 2 * m->patches ? m->surface.name[m->patch_surface[source >> 1]]
-	                               : m->light.name[source - 2 * m->patches];
+	return source < 2 * m->patch.n ? m->surface.name[m->patch.surface[source >> 1]]
+	                               : m->light.name[source - 2 * m->patch.n];
 }
 
 static int band_ends(struct ends *x, struct err *e)
@@ -191,14 +191,14 @@ static int band_ends(struct ends *x, struct err *e)
 	return 0;
 }
 
-int components_need_sink(const struct transport *t, struct err *e)
+int radiosity_components_need_sink(const struct transport *t, struct err *e)
 {
 	int bad = 0;
 
 	for (int band = 0; !bad && band < t->m->bands; band++) {
 		struct ends x = { .t = t, .band = band };
 		int any_white = 0;
-		for (uint32_t ps = 0; ps < 2 * t->m->patches; ps++)
+		for (uint32_t ps = 0; ps < 2 * t->m->patch.n; ps++)
 			any_white |= albedo(t, ps, band) >= white;
 		if (!any_white)
 			continue;

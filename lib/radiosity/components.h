@@ -11,12 +11,12 @@ struct components {
 
 /* Patch-sides joined by any row, or by transmission through the patch itself.
  * O(runs). 0, or -1 and e. */
-int components_init(struct components *c, const struct transport *t, struct err *e);
-void components_free(struct components *c);
+int radiosity_components_init(struct components *c, const struct transport *t, struct err *e);
+void radiosity_components_free(struct components *c);
 
 /* 0 if all light can be absorbed or leave; else -1 and "no steady state", for light
  * of some band that reaches a closed part of albedo 1. O(runs x depth), but O(patches)
  * where no albedo is 1. */
-int components_need_sink(const struct transport *t, struct err *e);
+int radiosity_components_need_sink(const struct transport *t, struct err *e);
 
 #endif

@@ -78,7 +78,7 @@ static ALWAYS_INLINE void add_list(const struct gather *g, const struct feed *x,
                                    int f32, int fresh, int mixed)
 {
 	const struct ff *f = x->f;
-	const uint64_t n = f->block_start[x->block + 1] - p.entry;
+	const uint64_t n = f->block.start[x->block + 1] - p.entry;
 
 	for (uint64_t i = 0; i < n; i++) {
 		uint32_t column = ff_word(f, p.word + i);
@@ -95,7 +95,7 @@ static ALWAYS_INLINE void add_spans(const struct gather *g, const struct feed *x
                                     int f32, int fresh, int mixed)
 {
 	const struct ff *f = x->f;
-	const uint64_t end = f->block_start[x->block + 1];
+	const uint64_t end = f->block.start[x->block + 1];
 
 	for (int cut = 0; p.entry < end && !cut; p.word += 2, p.done = 0) {
 		uint32_t column = ff_word(f, p.word), first = (column >> 1) + p.done;
@@ -142,7 +142,7 @@ static void add_feed(const struct gather *g, const struct feed *x, struct place 
 static void seek_span(const struct feed *x, uint32_t receiver, struct place *p)
 {
 	const struct ff *f = x->f;
-	const uint64_t end = f->block_start[x->block + 1];
+	const uint64_t end = f->block.start[x->block + 1];
 
 	for (; p->entry < end; p->word += 2) {
 		uint32_t first = ff_word(f, p->word) >> 1, count = ff_word(f, p->word + 1);
@@ -158,7 +158,7 @@ static void seek_span(const struct feed *x, uint32_t receiver, struct place *p)
 /* Ranges are whole patches: both sides of a patch are on one side of a bound. */
 static void seek_word(const struct feed *x, uint32_t receiver, struct place *p)
 {
-	uint64_t n = x->f->block_start[x->block + 1] - p->entry, at = 0;
+	uint64_t n = x->f->block.start[x->block + 1] - p->entry, at = 0;
 
 	while (n) {
 		uint64_t half = n / 2;
@@ -174,7 +174,7 @@ static void seek_word(const struct feed *x, uint32_t receiver, struct place *p)
 static struct place find_place(const struct feed *x, uint32_t receiver)
 {
 	const struct ff *f = x->f;
-	struct place p = { ff_first_word(f, x->block), f->block_start[x->block], 0 };
+	struct place p = { ff_first_word(f, x->block), f->block.start[x->block], 0 };
 
 	if (receiver && ff_has_spans(f, x->block))
 		seek_span(x, receiver, &p);
@@ -290,15 +290,15 @@ static void put_channels(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct gather *g = arg;
 	const struct model *m = g->t->m;
-	double *to[H_PARTS] = { g->s->direct, g->s->caustic, g->s->indirect };
+	double *to[H_PARTS] = { g->s->irradiance.direct, g->s->irradiance.caustic, g->s->irradiance.indirect };
 	size_t bands = (size_t)g->s->bands;
 
 	(void)thread;
 	for (size_t es = begin; es < end; es++) {
-		uint32_t element = (uint32_t)(es >> 1), patch = m->element_patch[element];
+		uint32_t element = (uint32_t)(es >> 1), patch = m->element.patch[element];
 		size_t side = (es & 1) * g->receivers;
 		size_t from = side + (g->to_patches ? patch : element);
-		double area = g->to_patches ? m->patch_area[patch] : m->element_area[element];
+		double area = g->to_patches ? m->patch.area[patch] : m->element.area[element];
 		for (size_t k = 0; k < LANES && g->first + k < g->channels; k++) {
 			size_t c = g->first + k;
 			size_t at = (c / bands * g->s->element_sides + es) * bands + c % bands;
@@ -307,8 +307,8 @@ static void put_channels(void *arg, size_t begin, size_t end, int thread)
 			if (c < bands) {
 				double direct = (double)g->variance[0][from][k] * g->unit;
 				double other = (double)g->variance[1][from][k] * g->unit;
-				g->s->error_direct[at] = sqrt(direct) / area;
-				g->s->error[at] = sqrt(direct + other) / area;
+				g->s->error.sampling_direct[at] = sqrt(direct) / area;
+				g->s->error.sampling[at] = sqrt(direct + other) / area;
 			}
 		}
 	}
@@ -321,7 +321,7 @@ static double bytes_of(const struct gather *g)
 
 	for (size_t i = 0; i < g->feeds; i++) {
 		const struct ff *f = g->feed[i].f;
-		const uint64_t *entry = f->block_start + g->feed[i].block;
+		const uint64_t *entry = f->block.start + g->feed[i].block;
 		size_t word = f->column16 ? sizeof *f->column16 : sizeof *f->column;
 		size_t value = f->value ? sizeof *f->value : sizeof *f->value64;
 		bytes += (double)(entry[1] - entry[0]) *
@@ -366,20 +366,20 @@ static int gather_channels(struct gather *g, int threads, struct err *e)
 static int block_fluxes(const struct transport *t, const struct solution *s, double *flux[2],
                         struct err *e)
 {
-	struct sender sender;
+	struct propagator sender;
 	size_t channels = solution_channels(s);
-	int bad = sender_init(&sender, t, s->groups, e);
+	int bad = radiosity_propagator_init(&sender, t, s->groups, e);
 
 	for (uint32_t r = 0; !bad && r < t->rows; r++)
 		for (int fresh = 0; fresh < 2; fresh++) {
 			double *to = flux[fresh] + t->row_block[r] * channels;
-			send_block_flux(&sender, r, s->shot + (2 * (size_t)r + (size_t)fresh) * channels,
-			                to);
+			radiosity_propagate_block_flux(&sender, r, s->shot + (2 * (size_t)r + (size_t)fresh) * channels,
+			                               to);
 			for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
 				for (size_t c = 0; c < channels; c++)
 					*to++ /= t->block[b].sum > 0 ? t->block[b].sum : 1;
 		}
-	sender_free(&sender);
+	radiosity_propagator_free(&sender);
 	return bad;
 }
 
@@ -390,23 +390,23 @@ static int cut_ranges(struct gather *g, struct err *e)
 
 	if (!(g->cut = mem_new(g->ranges + 1, sizeof *g->cut, "irradiance", e)))
 		return -1;
-	for (uint32_t p = 0; p <= m->patches; p++) {
-		uint32_t begin = g->to_patches ? p : m->patch_start[p];
+	for (uint32_t p = 0; p <= m->patch.n; p++) {
+		uint32_t begin = g->to_patches ? p : m->patch.start[p];
 		for (; i <= g->ranges && begin * (uint64_t)g->ranges >= i * (uint64_t)g->receivers; i++)
 			g->cut[i] = begin;
 	}
 	return 0;
 }
 
-int radiosity_gather(struct solution *s, const struct transport *t, int threads,
-                     struct radiosity_report *r, struct err *e)
+int radiosity_element_irradiance(struct solution *s, const struct transport *t, int threads,
+                                 struct radiosity_report *r, struct err *e)
 {
 	double *flux[2];
 	struct gather g = { .t = t, .s = s, .to_patches = t->shard[0]->to_patches,
 	                    .channels = solution_channels(s),
 	                    .ranges = threads > 1 ? (size_t)threads : 1 };
 
-	g.receivers = g.to_patches ? t->m->patches : t->m->elements;
+	g.receivers = g.to_patches ? t->m->patch.n : t->m->element.n;
 	for (int i = 0; i < 2; i++)
 		g.block_flux[i] = flux[i] = mem_new(t->blocks, g.channels * sizeof(double),
 		                                    "flux by chain", e);

@@ -20,8 +20,8 @@ enum { BASIS_MAX = 40, BASIS_MIN = 4 };
 /* Bytes that the basis may take. */
 static const double basis_bytes = 1 << 29;
 
-struct krylov {
-	struct solver *v;
+struct gmres {
+	struct shooter *v;
 	size_t vectors, channels;
 	size_t items;         /* diffuse sides, then links by freshness */
 	size_t size;          /* items x vectors */
@@ -35,17 +35,17 @@ struct krylov {
 	void *room[7];
 };
 
-static lanes *h_at(const struct krylov *k, size_t column, size_t row)
+static lanes *h_at(const struct gmres *k, size_t column, size_t row)
 {
 	return k->h + (column * (k->most + 1) + row) * k->vectors;
 }
 
-static lanes *basis_at(const struct krylov *k, size_t i)
+static lanes *basis_at(const struct gmres *k, size_t i)
 {
 	return k->basis + i * k->size;
 }
 
-static uint32_t side_of(const struct krylov *k, size_t item)
+static uint32_t side_of(const struct gmres *k, size_t item)
 {
 	size_t sides = k->v->s->patch_sides;
 	return item < sides ? (uint32_t)item : k->v->t->link_target[(item - sides) >> 1];
@@ -53,7 +53,7 @@ static uint32_t side_of(const struct krylov *k, size_t item)
 
 /* ---- arithmetic by channel ---- */
 
-static void dot(const struct krylov *k, const lanes *a, const lanes *b, lanes *sum)
+static void dot(const struct gmres *k, const lanes *a, const lanes *b, lanes *sum)
 {
 	size_t n = k->vectors;
 
@@ -65,7 +65,7 @@ static void dot(const struct krylov *k, const lanes *a, const lanes *b, lanes *s
 	}
 }
 
-static void norm(const struct krylov *k, const lanes *a, lanes *to)
+static void norm(const struct gmres *k, const lanes *a, lanes *to)
 {
 	dot(k, a, a, to);
 	for (size_t c = 0; c < k->channels; c++)
@@ -73,7 +73,7 @@ static void norm(const struct krylov *k, const lanes *a, lanes *to)
 }
 
 /* y += f x */
-static void add(const struct krylov *k, const lanes *f, const lanes *x, lanes *y)
+static void add(const struct gmres *k, const lanes *f, const lanes *x, lanes *y)
 {
 	for (size_t i = 0; i < k->items; i++)
 		for (size_t v = 0; v < k->vectors; v++)
@@ -81,7 +81,7 @@ static void add(const struct krylov *k, const lanes *f, const lanes *x, lanes *y
 }
 
 /* x /= f, 0 where f is. */
-static void divide(const struct krylov *k, const lanes *f, lanes *x)
+static void divide(const struct gmres *k, const lanes *f, lanes *x)
 {
 	lanes inverse[VECTORS_MAX];
 
@@ -98,10 +98,10 @@ static void divide(const struct krylov *k, const lanes *f, lanes *x)
 /* ---- K ---- */
 
 /* y = x - K x. The sender's own unshot flux gives way to y meanwhile. */
-static void apply(struct krylov *k, const lanes *x, lanes *y)
+static void apply(struct gmres *k, const lanes *x, lanes *y)
 {
-	struct solver *v = k->v;
-	struct sender *s = &v->sender;
+	struct shooter *v = k->v;
+	struct propagator *s = &v->sender;
 	lanes *diffuse = s->unshot_diffuse, *link = s->unshot_link;
 	size_t n = k->vectors, sides = v->s->patch_sides;
 
@@ -109,10 +109,10 @@ static void apply(struct krylov *k, const lanes *x, lanes *y)
 	s->unshot_diffuse = y;
 	s->unshot_link = y + sides * n;
 	for (size_t i = 0; i < sides; i++)
-		solver_send_diffuse(v, (uint32_t)i, x + i * n, NULL);
+		radiosity_shoot_diffuse(v, (uint32_t)i, x + i * n, NULL);
 	for (size_t l = 0; l < 2 * v->s->links; l++)
-		solver_send_link(v, l, x + (sides + l) * n, NULL);
-	sent_clear(&v->sent);
+		radiosity_shoot_link(v, l, x + (sides + l) * n, NULL);
+	radiosity_shot_ledger_clear(&v->sent);
 	s->unshot_diffuse = diffuse;
 	s->unshot_link = link;
 	for (size_t i = 0; i < k->size; i++)
@@ -131,7 +131,7 @@ static void rotate(lanes *a, lanes *b, const lanes *cos, const lanes *sin, size_
 }
 
 /* The rotation that makes *b 0. */
-static void new_rotation(const struct krylov *k, size_t j)
+static void new_rotation(const struct gmres *k, size_t j)
 {
 	const double *a = (double *)h_at(k, j, j), *b = (double *)h_at(k, j, j + 1);
 	double *cos = (double *)(k->cos + j * k->vectors);
@@ -145,7 +145,7 @@ static void new_rotation(const struct krylov *k, size_t j)
 }
 
 /* Step j of Arnoldi's method with modified Gram-Schmidt. */
-static void arnoldi(struct krylov *k, size_t j)
+static void arnoldi(struct gmres *k, size_t j)
 {
 	lanes *w = basis_at(k, j + 1), before[VECTORS_MAX], minus[VECTORS_MAX];
 	lanes *next = h_at(k, j, j + 1);
@@ -169,7 +169,7 @@ static void arnoldi(struct krylov *k, size_t j)
 }
 
 /* The largest residual of a channel, relative to what it was. */
-static double residual(const struct krylov *k, size_t j)
+static double residual(const struct gmres *k, size_t j)
 {
 	const double *g = (double *)(k->g + j * k->vectors), *all = (double *)k->norm;
 	double worst = 0;
@@ -181,7 +181,7 @@ static double residual(const struct krylov *k, size_t j)
 }
 
 /* Steps until the residual is `target` of what it was; how many. */
-static size_t iterate(struct krylov *k, double target)
+static size_t iterate(struct gmres *k, double target)
 {
 	size_t n = k->vectors, j = 0;
 
@@ -202,7 +202,7 @@ static size_t iterate(struct krylov *k, double target)
 }
 
 /* The solution after so many steps; it takes the place of basis vector `steps`. */
-static lanes *solution_of(struct krylov *k, size_t steps)
+static lanes *solution_of(struct gmres *k, size_t steps)
 {
 	lanes *d = basis_at(k, steps);
 
@@ -225,7 +225,7 @@ static lanes *solution_of(struct krylov *k, size_t steps)
 /* ---- shots ---- */
 
 /* What a row has sent in all cannot be negative: raises flux so that it is not. */
-static void limit(const struct krylov *k, uint32_t row, int freshness, const lanes *share,
+static void limit(const struct gmres *k, uint32_t row, int freshness, const lanes *share,
                   lanes *flux)
 {
 	const double *shot = k->v->s->shot + (2 * (size_t)row + (size_t)freshness) * k->channels;
@@ -240,38 +240,38 @@ static void limit(const struct krylov *k, uint32_t row, int freshness, const lan
 	}
 }
 
-static void shoot_side(struct krylov *k, uint32_t ps, lanes *d)
+static void shoot_side(struct gmres *k, uint32_t ps, lanes *d)
 {
-	struct solver *v = k->v;
-	struct sender *s = &v->sender;
+	struct shooter *v = k->v;
+	struct propagator *s = &v->sender;
 	const struct transport *t = v->t;
 	size_t n = k->vectors;
-	const lanes *share = sender_share(s, ps);
+	const lanes *share = radiosity_propagator_share(s, ps);
 
-	limit(k, t->diffuse_row[ps], MIXED, NULL, d + ps * n);
-	exact_take(s, exact_diffuse(s, ps), d + ps * n);
-	solver_send_diffuse(v, ps, d + ps * n, v->s->shot);
-	exact_return(s, exact_diffuse(s, ps), &v->sent);
+	limit(k, t->diffuse_row[ps], FROM_DIFFUSE, NULL, d + ps * n);
+	radiosity_exact_take(s, radiosity_exact_diffuse(s, ps), d + ps * n);
+	radiosity_shoot_diffuse(v, ps, d + ps * n, v->s->shot);
+	radiosity_exact_return(s, radiosity_exact_diffuse(s, ps), &v->sent);
 	for (uint64_t l = 2 * t->target_link[ps]; l < 2 * t->target_link[ps + 1]; l++) {
 		lanes *flux = d + (v->s->patch_sides + l) * n;
 		for (uint64_t way = 0; way < 2; way++)
 			limit(k, t->link_row[(l & ~(uint64_t)1) + way], (int)(l & 1),
 			      share + way * n, flux);
-		exact_take(s, exact_link(s, l), flux);
-		solver_send_link(v, l, flux, v->s->shot);
-		exact_return(s, exact_link(s, l), &v->sent);
+		radiosity_exact_take(s, radiosity_exact_link(s, l), flux);
+		radiosity_shoot_link(v, l, flux, v->s->shot);
+		radiosity_exact_return(s, radiosity_exact_link(s, l), &v->sent);
 	}
-	solver_book(v, NULL);
+	radiosity_book(v, NULL);
 	v->s->shots++;
 }
 
 /* ---- the beginning and the end ---- */
 
-static int krylov_init(struct krylov *k, struct solver *v, struct err *e)
+static int krylov_init(struct gmres *k, struct shooter *v, struct err *e)
 {
 	size_t n = v->sender.vectors, sides = v->s->patch_sides;
 
-	*k = (struct krylov){ .v = v, .vectors = n, .channels = v->sender.channels,
+	*k = (struct gmres){ .v = v, .vectors = n, .channels = v->sender.channels,
 	                      .items = sides + 2 * v->s->links };
 	k->size = k->items * n;
 	k->most = (size_t)fmin(BASIS_MAX, fmax(BASIS_MIN, basis_bytes /
@@ -286,50 +286,50 @@ static int krylov_init(struct krylov *k, struct solver *v, struct err *e)
 	return k->weight && k->basis && k->h && k->cos && k->sin && k->g && k->norm ? 0 : -1;
 }
 
-static void krylov_free(struct krylov *k)
+static void krylov_free(struct gmres *k)
 {
 	for (size_t i = 0; i < sizeof k->room / sizeof *k->room; i++)
 		free(k->room[i]);
 }
 
 /* 1 / (area x albedo x emitted^2); albedos below a percent count as one. */
-static void set_weights(struct krylov *k)
+static void set_weights(struct gmres *k)
 {
-	const struct solver *v = k->v;
-	const struct sender *s = &v->sender;
+	const struct shooter *v = k->v;
+	const struct propagator *s = &v->sender;
 	size_t n = k->vectors;
 
 	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++)
 		for (size_t i = 0; i < n; i++) {
-			const lanes *here = s->part + s->surface[ps] * PARTS * n + i;
-			const lanes *there = s->part + s->surface[ps ^ 1] * PARTS * n + i;
-			lanes albedo = here[PART_RHO * n] + here[PART_LOBES * n] +
-			               there[PART_TAU * n] + .01;
-			lanes w = v->weight[v->parts.of[ps] * n + i];
-			k->weight[ps * n + i] = w * w / (albedo * v->t->m->patch_area[ps >> 1]);
+			const lanes *here = s->part + s->surface[ps] * SPLITS * n + i;
+			const lanes *there = s->part + s->surface[ps ^ 1] * SPLITS * n + i;
+			lanes albedo = here[SPLIT_RHO * n] + here[SPLIT_LOBES * n] +
+			               there[SPLIT_TAU * n] + .01;
+			lanes w = v->weight[v->components.of[ps] * n + i];
+			k->weight[ps * n + i] = w * w / (albedo * v->t->m->patch.area[ps >> 1]);
 		}
 }
 
 /* Overshooting knows no emission: it is shot before. */
-static void shoot_emission(struct solver *v)
+static void shoot_emission(struct shooter *v)
 {
 	size_t bands = (size_t)v->s->bands;
 
 	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++)
 		for (size_t b = 0; b < bands; b++)
-			if (v->s->unshot_emission[ps * bands + b] > 0) {
-				solver_shoot(v, ps, 0);
+			if (v->s->unshot.emission[ps * bands + b] > 0) {
+				radiosity_shoot_side(v, ps, 0);
 				break;
 			}
 }
 
-int solver_overshoot(struct solver *v, double worst, double stop, struct err *e)
+int radiosity_gmres_finish(struct shooter *v, double worst, double stop, struct err *e)
 {
 	/* Light that is absorbed slowly does many times what is unshot; two digits more cost
 	 * a pass or two. */
 	const double target = .01 * stop / worst;
-	struct krylov k;
-	struct exact exact;
+	struct gmres k;
+	struct propagate_exact exact;
 	double left = worst;
 	int bad = krylov_init(&k, v, e);
 
@@ -341,11 +341,11 @@ int solver_overshoot(struct solver *v, double worst, double stop, struct err *e)
 		memcpy(k.basis + v->s->patch_sides * k.vectors, v->sender.unshot_link,
 		       2 * v->s->links * k.vectors * sizeof(lanes));
 		lanes *d = solution_of(&k, iterate(&k, target));
-		bad = exact_begin(&v->sender, &exact, e);
+		bad = radiosity_exact_begin(&v->sender, &exact, e);
 		for (uint32_t ps = 0; !bad && ps < v->s->patch_sides; ps++)
 			shoot_side(&k, ps, d);
-		exact_end(&v->sender);
-		solver_survey(v, &left);
+		radiosity_exact_end(&v->sender);
+		radiosity_survey(v, &left);
 	}
 	krylov_free(&k);
 	return bad ? -1 : left < .9 * worst;

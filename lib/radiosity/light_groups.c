@@ -20,7 +20,7 @@ static int emits(const struct model *m, uint32_t material)
 static int shines(const struct model *m, uint32_t light)
 {
 	for (int k = 0; k < m->bands; k++)
-		if (light_flux(m, light, k) > 0)
+		if (model_light_flux(m, light, k) > 0)
 			return 1;
 	return 0;
 }
@@ -46,13 +46,13 @@ static char *unique_name(const struct solution *s, size_t groups, const char *na
 
 static int is_used(const struct model *m, uint32_t material)
 {
-	for (size_t p = 0; p < m->patches; p++)
+	for (size_t p = 0; p < m->patch.n; p++)
 		if (model_patch_material(m, (uint32_t)p) == material)
 			return 1;
 	return 0;
 }
 
-int light_groups_set(struct solution *s, const struct model *m, int apart, struct err *e)
+int radiosity_groups_set(struct solution *s, const struct model *m, int apart, struct err *e)
 {
 	const size_t most = CHANNELS_MAX / (size_t)m->bands;
 	size_t groups = 0;
@@ -141,7 +141,7 @@ static const char *factors(const struct solution *s, const char *text, double *f
 
 static void scale_irradiance(struct solution *s, const double *factor)
 {
-	double *part[] = { s->direct, s->caustic, s->indirect };
+	double *part[] = { s->irradiance.direct, s->irradiance.caustic, s->irradiance.indirect };
 	size_t bands = (size_t)s->bands, n = s->element_sides * bands;
 
 	for (size_t i = 0; i < n; i++) {
@@ -154,10 +154,10 @@ static void scale_irradiance(struct solution *s, const double *factor)
 		}
 		double after = solution_irradiance(s, i / bands, (int)(i % bands));
 		double change = before > 0 ? after / before : most;
-		s->error[i] *= change;
-		s->error_direct[i] *= change;
-		s->discretisation[i] *= change;
-		s->discretisation_direct[i] *= change;
+		s->error.sampling[i] *= change;
+		s->error.sampling_direct[i] *= change;
+		s->error.discretisation[i] *= change;
+		s->error.discretisation_direct[i] *= change;
 	}
 }
 
@@ -171,11 +171,11 @@ static void scale_emission(const struct solution *s, struct model *m, const doub
 				factor[s->emitter_group[m->material.n + i] * bands + k];
 	for (size_t i = 0; i < m->material.n; i++)
 		for (size_t k = 0; k < 2 * bands; k++)
-			m->material.emission[material_at(&m->material, i, FRONT) + k] *=
+			m->material.emission[model_material_at(&m->material, i, FRONT) + k] *=
 				factor[s->emitter_group[i] * bands + k % bands];
 }
 
-int light_groups_mix(struct solution *s, struct model *m, const char *mix, struct err *e)
+int radiosity_groups_mix(struct solution *s, struct model *m, const char *mix, struct err *e)
 {
 	double *factor = mem_new(solution_channels(s), sizeof *factor, "light groups", e);
 

@@ -8,7 +8,7 @@
 #include "lib/scatter/bsdf.h"
 
 /* How the sides of materials split the flux that arrives on them. */
-static void fill_parts(struct sender *s)
+static void fill_parts(struct propagator *s)
 {
 	const struct materials *mt = &s->m->material;
 	size_t width = LANES * s->vectors;
@@ -16,28 +16,28 @@ static void fill_parts(struct sender *s)
 	for (uint32_t i = 0; i < 2 * mt->n; i++) {
 		uint32_t material = i >> 1;
 		int side = (int)(i & 1);
-		size_t at = material_at(mt, material, side);
-		double *part = (double *)(s->part + i * PARTS * s->vectors);
+		size_t at = model_material_at(mt, material, side);
+		double *part = (double *)(s->part + i * SPLITS * s->vectors);
 		double *share = (double *)(s->share + i * 2 * s->vectors);
 		int lobe_r = bsdf_has_lobe(mt, material, side, 0);
 		int lobe_t = bsdf_has_lobe(mt, material, side, 1);
 		for (size_t c = 0; c < s->channels; c++) {
 			size_t k = c % (size_t)s->bands;
-			part[PART_RHO * width + c] = mt->rho_d[at + k];
-			part[PART_TAU * width + c] = mt->tau_d[at + k];
+			part[SPLIT_RHO * width + c] = mt->rho_d[at + k];
+			part[SPLIT_TAU * width + c] = mt->tau_d[at + k];
 			double r = lobe_r ? mt->rho_s[at + k] : 0, t = lobe_t ? mt->tau_s[at + k] : 0;
-			part[PART_LOBES * width + c] = r + t;
+			part[SPLIT_LOBES * width + c] = r + t;
 			share[c] = r > 0 ? r / (r + t) : 0;
 			share[width + c] = r + t > 0 ? 1 - share[c] : 0;
-			part[PART_ABSORBED * width + c] =
+			part[SPLIT_ABSORBED * width + c] =
 				1 - bsdf_albedo(mt, material, side, (int)k);
 		}
 	}
-	for (uint32_t ps = 0; ps < 2 * s->m->patches; ps++)
+	for (uint32_t ps = 0; ps < 2 * s->m->patch.n; ps++)
 		s->surface[ps] = 2 * model_patch_material(s->m, ps >> 1) + (ps & 1);
 }
 
-int sent_new(struct sent *x, size_t vectors, struct err *e)
+int radiosity_shot_ledger_new(struct shot_ledger *x, size_t vectors, struct err *e)
 {
 	lanes *at = lanes_new(6 * vectors, &x->room, "flux", e);
 
@@ -51,35 +51,35 @@ int sent_new(struct sent *x, size_t vectors, struct err *e)
 	return at ? 0 : -1;
 }
 
-void sent_clear(struct sent *x)
+void radiosity_shot_ledger_clear(struct shot_ledger *x)
 {
 	memset(x->absorbed, 0, 6 * x->vectors * sizeof(lanes));
 }
 
-void sent_free(struct sent *x)
+void radiosity_shot_ledger_free(struct shot_ledger *x)
 {
 	free(x->room);
-	*x = (struct sent){ 0 };
+	*x = (struct shot_ledger){ 0 };
 }
 
-int sender_init(struct sender *s, const struct transport *t, size_t groups, struct err *e)
+int radiosity_propagator_init(struct propagator *s, const struct transport *t, size_t groups, struct err *e)
 {
-	*s = (struct sender){ .t = t, .m = t->m, .bands = t->m->bands };
+	*s = (struct propagator){ .t = t, .m = t->m, .bands = t->m->bands };
 	s->channels = groups * (size_t)s->bands;
 	s->vectors = lanes_vectors(s->channels);
 	s->chain_flux = mem_new(t->chains.n, s->channels * sizeof(double), "chain flux", e);
 	s->touched = mem_new(t->chains.n, sizeof *s->touched, "chain flux", e);
 	s->is_touched = mem_new(t->chains.n, 1, "chain flux", e);
-	s->part = lanes_new(2 * t->m->material.n * PARTS * s->vectors, &s->room[0], "albedos", e);
+	s->part = lanes_new(2 * t->m->material.n * SPLITS * s->vectors, &s->room[0], "albedos", e);
 	s->share = lanes_new(2 * t->m->material.n * 2 * s->vectors, &s->room[3], "albedos", e);
-	s->surface = mem_new(2 * t->m->patches, sizeof *s->surface, "albedos", e);
+	s->surface = mem_new(2 * t->m->patch.n, sizeof *s->surface, "albedos", e);
 	if (!s->chain_flux || !s->touched || !s->is_touched || !s->part || !s->share || !s->surface)
 		return -1;
 	fill_parts(s);
 	return 0;
 }
 
-void sender_free(struct sender *s)
+void radiosity_propagator_free(struct propagator *s)
 {
 	for (size_t i = 0; i < sizeof s->room / sizeof *s->room; i++)
 		free(s->room[i]);
@@ -87,40 +87,40 @@ void sender_free(struct sender *s)
 	free(s->chain_flux);
 	free(s->touched);
 	free(s->is_touched);
-	*s = (struct sender){ 0 };
+	*s = (struct propagator){ 0 };
 }
 
-int sender_load(struct sender *s, const struct solution *sol, struct err *e)
+int radiosity_propagator_load(struct propagator *s, const struct solution *sol, struct err *e)
 {
-	size_t sides = 2 * s->m->patches, links = 2 * s->t->links;
+	size_t sides = 2 * s->m->patch.n, links = 2 * s->t->links;
 
 	s->unshot_diffuse = lanes_new(sides * s->vectors, &s->room[1], "unshot flux", e);
 	s->unshot_link = lanes_new(links * s->vectors, &s->room[2], "unshot flux", e);
 	if (!s->unshot_diffuse || !s->unshot_link)
 		return -1;
-	lanes_pack(s->unshot_diffuse, sol->unshot_diffuse, sides, s->channels);
-	lanes_pack(s->unshot_link, sol->unshot_link, links, s->channels);
+	lanes_pack(s->unshot_diffuse, sol->unshot.diffuse, sides, s->channels);
+	lanes_pack(s->unshot_link, sol->unshot.link, links, s->channels);
 	return 0;
 }
 
-void sender_store(const struct sender *s, struct solution *sol)
+void radiosity_propagator_store(const struct propagator *s, struct solution *sol)
 {
-	lanes_unpack(sol->unshot_diffuse, s->unshot_diffuse, 2 * s->m->patches, s->channels);
-	lanes_unpack(sol->unshot_link, s->unshot_link, 2 * s->t->links, s->channels);
+	lanes_unpack(sol->unshot.diffuse, s->unshot_diffuse, 2 * s->m->patch.n, s->channels);
+	lanes_unpack(sol->unshot.link, s->unshot_link, 2 * s->t->links, s->channels);
 }
 
 /* The coefficients of an event, [bands]. */
-static const double *coefficient(const struct sender *s, uint32_t event)
+static const double *coefficient(const struct propagator *s, uint32_t event)
 {
 	const struct materials *mt = &s->m->material;
-	size_t at = material_at(mt, event / 4, (int)(event / 2 % 2));
+	size_t at = model_material_at(mt, event / 4, (int)(event / 2 % 2));
 
 	return (event & 1 ? mt->tau_s : mt->rho_s) + at;
 }
 
 /* Flux x by unit of the values that an event sends on. What no sample of the row followed
  * stays in chain_flux of chain 0, which cannot be a child, and ends up as cut. */
-static void into_chain(struct sender *s, const struct onward *o, const double *x)
+static void into_chain(struct propagator *s, const struct onward *o, const double *x)
 {
 	const uint32_t chain = o->chain == CHAIN_NONE ? 0 : o->chain;
 	const double *part = coefficient(s, o->event);
@@ -135,7 +135,7 @@ static void into_chain(struct sender *s, const struct onward *o, const double *x
 }
 
 /* Takes the flux that waits for a chain. */
-static void take(struct sender *s, uint32_t chain, double *x)
+static void take(struct propagator *s, uint32_t chain, double *x)
 {
 	double *flux = s->chain_flux + chain * s->channels;
 
@@ -144,14 +144,14 @@ static void take(struct sender *s, uint32_t chain, double *x)
 }
 
 /* Enters what became of flux in vector v. */
-static inline void book(const struct sender *s, lanes *to, size_t v, lanes flux)
+static inline void book(const struct propagator *s, lanes *to, size_t v, lanes flux)
 {
 	to[v] += flux;
 	if (s->exact)
-		exact_book(s->exact, v, flux);
+		radiosity_exact_book(s->exact, v, flux);
 }
 
-static void finish(struct sender *s, lanes *cut)
+static void finish(struct propagator *s, lanes *cut)
 {
 	lanes x[VECTORS_MAX];
 
@@ -172,7 +172,7 @@ enum { LANDING_MAX = 4, FETCHED = 16, LINE = 64 };
 /* Flux landing from a block: N vectors of channels from v on of n, x by unit of the
  * values. The loops over runs are inlined with a constant N. */
 struct landing {
-	const struct sender *s;
+	const struct propagator *s;
 	const struct block *block;
 	size_t v, n;
 	int freshness;
@@ -184,12 +184,12 @@ struct landed {
 	lanes arrived, kept, absorbed, cut, guessed;
 };
 
-static ALWAYS_INLINE void land_plain(const struct landing *l, uint64_t run, size_t N, size_t n,
-                                     struct landed *sum)
+static ALWAYS_INLINE void land_diffuse(const struct landing *l, uint64_t run, size_t N, size_t n,
+                                       struct landed *sum)
 {
 	const uint32_t target = l->s->t->run_target[run];
 	const double value = l->s->t->run_sum[run];
-	const lanes *rho = l->s->part + l->s->surface[target] * PARTS * n + l->v;
+	const lanes *rho = l->s->part + l->s->surface[target] * SPLITS * n + l->v;
 	lanes *unshot = l->s->unshot_diffuse + target * n + l->v;
 
 	for (size_t i = 0; i < N; i++) {
@@ -200,14 +200,14 @@ static ALWAYS_INLINE void land_plain(const struct landing *l, uint64_t run, size
 	}
 }
 
-static ALWAYS_INLINE void land_special(const struct landing *l, uint64_t run, size_t N, size_t n,
+static ALWAYS_INLINE void land_general(const struct landing *l, uint64_t run, size_t N, size_t n,
                                        struct landed *sum)
 {
-	const struct sender *s = l->s;
+	const struct propagator *s = l->s;
 	const uint32_t target = s->t->run_target[run];
 	const uint32_t link = s->t->run_link[l->block->link + (run - l->block->special)];
 	const double value = s->t->run_sum[run];
-	const lanes *part = s->part + s->surface[target] * PARTS * n + l->v;
+	const lanes *part = s->part + s->surface[target] * SPLITS * n + l->v;
 	lanes *here = s->unshot_diffuse + target * n + l->v;
 	lanes *there = s->unshot_diffuse + (target ^ 1) * n + l->v, *to = NULL;
 
@@ -215,12 +215,12 @@ static ALWAYS_INLINE void land_special(const struct landing *l, uint64_t run, si
 		to = s->unshot_link + (2 * (size_t)(link & ~RUN_GUESSED) + (size_t)l->freshness) * n +
 		     l->v;
 	for (size_t i = 0; i < N; i++) {
-		lanes x = l->x[i] * value, same = part[PART_RHO * n + i] * x;
-		lanes other = part[PART_TAU * n + i] * x, lobes = part[PART_LOBES * n + i] * x;
+		lanes x = l->x[i] * value, same = part[SPLIT_RHO * n + i] * x;
+		lanes other = part[SPLIT_TAU * n + i] * x, lobes = part[SPLIT_LOBES * n + i] * x;
 		here[i] += same;
 		there[i] += other;
 		sum[i].kept += same + other;
-		sum[i].absorbed += part[PART_ABSORBED * n + i] * x;
+		sum[i].absorbed += part[SPLIT_ABSORBED * n + i] * x;
 		if (to) {
 			to[i] += lobes;
 			sum[i].kept += lobes;
@@ -232,7 +232,7 @@ static ALWAYS_INLINE void land_special(const struct landing *l, uint64_t run, si
 }
 
 /* Links are all over memory: fetches what will be added to by up to FETCHED runs. */
-static void fetch_links(const struct sender *s, const struct block *block, uint64_t run,
+static void fetch_links(const struct propagator *s, const struct block *block, uint64_t run,
                         uint64_t end, int freshness)
 {
 	const uint32_t *link = s->t->run_link + block->link + (run - block->special);
@@ -247,18 +247,18 @@ static void fetch_links(const struct sender *s, const struct block *block, uint6
 }
 
 static ALWAYS_INLINE void land_all(const struct landing *l, uint64_t i, uint64_t end, size_t N,
-                                   size_t n, struct sent *sent)
+                                   size_t n, struct shot_ledger *sent)
 {
 	const uint64_t special = l->block->special < end ? l->block->special : end;
 	struct landed sum[2 * LANDING_MAX] = { 0 };
 
 	/* By turns, as one addition would wait for the last. */
 	for (; N == 1 && i + 1 < special; i += 2) {
-		land_plain(l, i, N, n, sum);
-		land_plain(l, i + 1, N, n, sum + 1);
+		land_diffuse(l, i, N, n, sum);
+		land_diffuse(l, i + 1, N, n, sum + 1);
 	}
 	for (; i < special; i++)
-		land_plain(l, i, N, n, sum);
+		land_diffuse(l, i, N, n, sum);
 	if (N == 1) {
 		sum[0].arrived += sum[1].arrived;
 		sum[0].kept += sum[1].kept;
@@ -268,7 +268,7 @@ static ALWAYS_INLINE void land_all(const struct landing *l, uint64_t i, uint64_t
 	for (; i < end; i++) {
 		if ((i - l->block->special) % FETCHED == 0 && l->v == 0 && i + FETCHED < l->block[1].run)
 			fetch_links(l->s, l->block, i + FETCHED, l->block[1].run, l->freshness);
-		land_special(l, i, N, n, sum);
+		land_general(l, i, N, n, sum);
 	}
 	for (size_t k = 0; k < N; k++) {
 		sent->kept[l->v + k] += sum[k].kept;
@@ -280,7 +280,7 @@ static ALWAYS_INLINE void land_all(const struct landing *l, uint64_t i, uint64_t
 
 /* N of the n vectors; where these are all, the compiler knows n too. */
 static void land(const struct landing *l, size_t N, uint64_t begin, uint64_t end,
-                 struct sent *sent)
+                 struct shot_ledger *sent)
 {
 	const int all = N == l->n;
 
@@ -300,8 +300,8 @@ static void land(const struct landing *l, size_t N, uint64_t begin, uint64_t end
 	}
 }
 
-static void send_block(struct sender *s, const struct block *block, int freshness,
-                       const lanes *in, struct sent *sent)
+static void send_block(struct propagator *s, const struct block *block, int freshness,
+                       const lanes *in, struct shot_ledger *sent)
 {
 	enum { TILE = 64 };          /* runs that stay in cache for all vectors */
 	const struct transport *t = s->t;
@@ -313,7 +313,7 @@ static void send_block(struct sender *s, const struct block *block, int freshnes
 	s->bytes += (double)(end - block->run) * (sizeof *t->run_target + sizeof *t->run_sum) +
 	            (double)(end - block->special) * sizeof *t->run_link;
 	if (s->exact) {
-		exact_land(s, block, freshness, in, sent);
+		radiosity_exact_land(s, block, freshness, in, sent);
 		return;
 	}
 	fetch_links(s, block, block->special, end, freshness);
@@ -327,7 +327,7 @@ static void send_block(struct sender *s, const struct block *block, int freshnes
 
 /* What goes on from a block, x its flux by unit of the values; go_round has what comes
  * back to it. */
-static void send_on(struct sender *s, const struct block *block, const double *x)
+static void send_on(struct propagator *s, const struct block *block, const double *x)
 {
 	for (uint64_t i = block->onward; i < block[1].onward; i++)
 		if (s->t->onward[i].chain != block->chain)
@@ -336,7 +336,7 @@ static void send_on(struct sender *s, const struct block *block, const double *x
 
 /* How much of the flux in a block comes back to it, per band, through events whose
  * count has stopped: the ratio of a geometric series. */
-static void loop_gain(const struct sender *s, const struct block *block, double *gain)
+static void loop_gain(const struct propagator *s, const struct block *block, double *gain)
 {
 	memset(gain, 0, (size_t)s->bands * sizeof *gain);
 	for (uint64_t i = block->onward; i < block[1].onward; i++) {
@@ -348,7 +348,7 @@ static void loop_gain(const struct sender *s, const struct block *block, double 
 
 /* All flux that lands from a block when `in` comes into it: once, and again each
  * time round. What could go round for ever is left in `cut`, if that is asked for. */
-static void go_round(struct sender *s, const struct block *block, double *in, lanes *cut)
+static void go_round(struct propagator *s, const struct block *block, double *in, lanes *cut)
 {
 	double gain[BANDS_MAX];
 	lanes ever[VECTORS_MAX];
@@ -366,7 +366,7 @@ static void go_round(struct sender *s, const struct block *block, double *in, la
 		book(s, cut, v, ever[v]);
 }
 
-void send_fetch(const struct sender *s, uint32_t row, int freshness, int ahead)
+void radiosity_propagate_fetch(const struct propagator *s, uint32_t row, int freshness, int ahead)
 {
 	enum { MOST = 64 };
 	const struct transport *t = s->t;
@@ -389,8 +389,8 @@ void send_fetch(const struct sender *s, uint32_t row, int freshness, int ahead)
 	__builtin_prefetch(t->run_link + block->link);
 }
 
-void send_row(struct sender *s, uint32_t row, int freshness, const lanes *flux,
-              struct sent *sent)
+void radiosity_propagate_row(struct propagator *s, uint32_t row, int freshness, const lanes *flux,
+                             struct shot_ledger *sent)
 {
 	const struct transport *t = s->t;
 	const size_t n = s->vectors;
@@ -420,7 +420,7 @@ void send_row(struct sender *s, uint32_t row, int freshness, const lanes *flux,
 	finish(s, sent->cut);
 }
 
-void send_block_flux(struct sender *s, uint32_t row, const double *flux, double *block_flux)
+void radiosity_propagate_block_flux(struct propagator *s, uint32_t row, const double *flux, double *block_flux)
 {
 	const struct transport *t = s->t;
 	double x[CHANNELS_MAX];

@@ -16,12 +16,12 @@ static inline void add(lanes *high, lanes *low, lanes x)
 	*high = sum;
 }
 
-int exact_begin(struct sender *s, struct exact *x, struct err *e)
+int radiosity_exact_begin(struct propagator *s, struct propagate_exact *x, struct err *e)
 {
 	size_t n = s->vectors;
 
-	*x = (struct exact){ .vectors = n };
-	x->diffuse = lanes_new(2 * s->m->patches * n, &x->room[0], "unshot flux", e);
+	*x = (struct propagate_exact){ .vectors = n };
+	x->diffuse = lanes_new(2 * s->m->patch.n * n, &x->room[0], "unshot flux", e);
 	x->link = lanes_new(2 * s->t->links * n, &x->room[1], "unshot flux", e);
 	x->due = lanes_new(2 * n, &x->room[2], "flux", e);
 	x->due_low = x->due + n;
@@ -29,11 +29,11 @@ int exact_begin(struct sender *s, struct exact *x, struct err *e)
 	return x->diffuse && x->link && x->due ? 0 : -1;
 }
 
-void exact_end(struct sender *s)
+void radiosity_exact_end(struct propagator *s)
 {
-	struct exact *x = s->exact;
+	struct propagate_exact *x = s->exact;
 
-	for (size_t i = 0; x->diffuse && i < 2 * s->m->patches * x->vectors; i++)
+	for (size_t i = 0; x->diffuse && i < 2 * s->m->patch.n * x->vectors; i++)
 		s->unshot_diffuse[i] += x->diffuse[i];
 	for (size_t i = 0; x->link && i < 2 * s->t->links * x->vectors; i++)
 		s->unshot_link[i] += x->link[i];
@@ -42,19 +42,19 @@ void exact_end(struct sender *s)
 	s->exact = NULL;
 }
 
-struct exact_item exact_diffuse(const struct sender *s, uint32_t ps)
+struct exact_item radiosity_exact_diffuse(const struct propagator *s, uint32_t ps)
 {
 	return (struct exact_item){ s->unshot_diffuse + ps * s->vectors,
 	                            s->exact->diffuse + ps * s->vectors };
 }
 
-struct exact_item exact_link(const struct sender *s, uint64_t l)
+struct exact_item radiosity_exact_link(const struct propagator *s, uint64_t l)
 {
 	return (struct exact_item){ s->unshot_link + l * s->vectors,
 	                            s->exact->link + l * s->vectors };
 }
 
-void exact_take(struct sender *s, struct exact_item from, const lanes *flux)
+void radiosity_exact_take(struct propagator *s, struct exact_item from, const lanes *flux)
 {
 	for (size_t v = 0; v < s->vectors; v++) {
 		add(&from.flux[v], &from.low[v], -flux[v]);
@@ -63,7 +63,7 @@ void exact_take(struct sender *s, struct exact_item from, const lanes *flux)
 	}
 }
 
-void exact_return(struct sender *s, struct exact_item to, struct sent *sent)
+void radiosity_exact_return(struct propagator *s, struct exact_item to, struct shot_ledger *sent)
 {
 	for (size_t v = 0; v < s->vectors; v++) {
 		lanes left = s->exact->due[v] + s->exact->due_low[v];
@@ -72,7 +72,7 @@ void exact_return(struct sender *s, struct exact_item to, struct sent *sent)
 	}
 }
 
-void exact_book(struct exact *x, size_t v, lanes flux)
+void radiosity_exact_book(struct propagate_exact *x, size_t v, lanes flux)
 {
 	add(&x->due[v], &x->due_low[v], -flux);
 }
@@ -95,39 +95,39 @@ static void keep(struct exact_item to, size_t v, lanes x, struct landed *l)
 	add_to(&l->kept, x);
 }
 
-static void land(struct sender *s, const struct block *block, uint64_t run, int freshness,
+static void land(struct propagator *s, const struct block *block, uint64_t run, int freshness,
                  lanes in, size_t v, struct landed *l)
 {
 	const size_t n = s->vectors;
 	const uint32_t target = s->t->run_target[run];
-	const lanes *part = s->part + s->surface[target] * PARTS * n + v;
-	const lanes x = in * s->t->run_sum[run], lobes = part[PART_LOBES * n] * x;
+	const lanes *part = s->part + s->surface[target] * SPLITS * n + v;
+	const lanes x = in * s->t->run_sum[run], lobes = part[SPLIT_LOBES * n] * x;
 
 	add_to(&l->arrived, x);
-	add_to(&l->absorbed, part[PART_ABSORBED * n] * x);
-	keep(exact_diffuse(s, target), v, part[PART_RHO * n] * x, l);
+	add_to(&l->absorbed, part[SPLIT_ABSORBED * n] * x);
+	keep(radiosity_exact_diffuse(s, target), v, part[SPLIT_RHO * n] * x, l);
 	if (run < block->special)
 		return;
 	uint32_t link = s->t->run_link[block->link + (run - block->special)];
-	keep(exact_diffuse(s, target ^ 1), v, part[PART_TAU * n] * x, l);
+	keep(radiosity_exact_diffuse(s, target ^ 1), v, part[SPLIT_TAU * n] * x, l);
 	if (link == FF_NO_ROW)
 		add_to(&l->cut, lobes);
 	else if (link != RUN_FOLLOWED)
-		keep(exact_link(s, 2 * (uint64_t)(link & ~RUN_GUESSED) + (uint64_t)freshness), v,
+		keep(radiosity_exact_link(s, 2 * (uint64_t)(link & ~RUN_GUESSED) + (uint64_t)freshness), v,
 		     lobes, l);
 	if (link != FF_NO_ROW && link != RUN_FOLLOWED && (link & RUN_GUESSED))
 		add_to(&l->guessed, lobes);
 }
 
-static void book_sum(struct exact *x, size_t v, const struct sum *s, lanes *to)
+static void book_sum(struct propagate_exact *x, size_t v, const struct sum *s, lanes *to)
 {
-	exact_book(x, v, s->high);
-	exact_book(x, v, s->low);
+	radiosity_exact_book(x, v, s->high);
+	radiosity_exact_book(x, v, s->low);
 	*to += s->high + s->low;
 }
 
-void exact_land(struct sender *s, const struct block *block, int freshness, const lanes *in,
-                struct sent *sent)
+void radiosity_exact_land(struct propagator *s, const struct block *block, int freshness, const lanes *in,
+                          struct shot_ledger *sent)
 {
 	for (size_t v = 0; v < s->vectors; v++) {
 		struct landed l = { 0 };

@@ -10,7 +10,7 @@
 
 #include "lib/radiosity/propagate.h"
 
-struct exact {
+struct propagate_exact {
 	lanes *diffuse, *link;   /* beside unshot_diffuse and unshot_link */
 	lanes *due, *due_low;    /* [vectors] of the flux in work what has come out nowhere yet */
 	size_t vectors;
@@ -19,27 +19,27 @@ struct exact {
 
 /* Begins to send exactly; 0, or -1 and e. The end, to be called either way, adds the second
  * numbers to the first. */
-int exact_begin(struct sender *s, struct exact *x, struct err *e);
-void exact_end(struct sender *s);
+int radiosity_exact_begin(struct propagator *s, struct propagate_exact *x, struct err *e);
+void radiosity_exact_end(struct propagator *s);
 
 /* Unshot flux that leaves a side diffusely, or by a link (2 link + freshness): [vectors]. */
 struct exact_item {
 	lanes *flux, *low;
 };
 
-struct exact_item exact_diffuse(const struct sender *s, uint32_t ps);
-struct exact_item exact_link(const struct sender *s, uint64_t l);
+struct exact_item radiosity_exact_diffuse(const struct propagator *s, uint32_t ps);
+struct exact_item radiosity_exact_link(const struct propagator *s, uint64_t l);
 
 /* Takes flux out of an item, to be sent next; and puts back what came out nowhere, which
  * counts as kept. */
-void exact_take(struct sender *s, struct exact_item from, const lanes *flux);
-void exact_return(struct sender *s, struct exact_item to, struct sent *sent);
+void radiosity_exact_take(struct propagator *s, struct exact_item from, const lanes *flux);
+void radiosity_exact_return(struct propagator *s, struct exact_item to, struct shot_ledger *sent);
 
 /* Enters where flux in work came out, of vector v. */
-void exact_book(struct exact *x, size_t v, lanes flux);
+void radiosity_exact_book(struct propagate_exact *x, size_t v, lanes flux);
 
 /* Lands flux from a block, `in` by unit of the values. O(runs). */
-void exact_land(struct sender *s, const struct block *block, int freshness, const lanes *in,
-                struct sent *sent);
+void radiosity_exact_land(struct propagator *s, const struct block *block, int freshness, const lanes *in,
+                          struct shot_ledger *sent);
 
 #endif

@@ -13,7 +13,7 @@
 static int solution_arrays(struct solution *s, const struct model *m,
                            const struct transport *t, struct err *e)
 {
-	size_t bands = (size_t)m->bands, es = 2 * m->elements, ps = 2 * m->patches;
+	size_t bands = (size_t)m->bands, es = 2 * m->element.n, ps = 2 * m->patch.n;
 	size_t channels = solution_channels(s), parts = s->groups * es;
 
 	s->element_sides = es;
@@ -21,39 +21,39 @@ static int solution_arrays(struct solution *s, const struct model *m,
 	s->sources = model_sources(m);
 	s->links = t->links;
 	s->rows = t->rows;
-	s->direct = mem_new(parts, bands * sizeof(double), "irradiance", e);
-	s->caustic = mem_new(parts, bands * sizeof(double), "irradiance", e);
-	s->indirect = mem_new(parts, bands * sizeof(double), "irradiance", e);
-	s->error = mem_new(es, bands * sizeof(double), "irradiance", e);
-	s->error_direct = mem_new(es, bands * sizeof(double), "irradiance", e);
-	s->discretisation = mem_new(es, bands * sizeof(double), "irradiance", e);
-	s->discretisation_direct = mem_new(es, bands * sizeof(double), "irradiance", e);
-	s->unshot_emission = mem_new(s->sources, bands * sizeof(double), "unshot flux", e);
-	s->unshot_diffuse = mem_new(ps, channels * sizeof(double), "unshot flux", e);
-	s->unshot_link = mem_new(t->links, 2 * channels * sizeof(double), "unshot flux", e);
+	s->irradiance.direct = mem_new(parts, bands * sizeof(double), "irradiance", e);
+	s->irradiance.caustic = mem_new(parts, bands * sizeof(double), "irradiance", e);
+	s->irradiance.indirect = mem_new(parts, bands * sizeof(double), "irradiance", e);
+	s->error.sampling = mem_new(es, bands * sizeof(double), "irradiance", e);
+	s->error.sampling_direct = mem_new(es, bands * sizeof(double), "irradiance", e);
+	s->error.discretisation = mem_new(es, bands * sizeof(double), "irradiance", e);
+	s->error.discretisation_direct = mem_new(es, bands * sizeof(double), "irradiance", e);
+	s->unshot.emission = mem_new(s->sources, bands * sizeof(double), "unshot flux", e);
+	s->unshot.diffuse = mem_new(ps, channels * sizeof(double), "unshot flux", e);
+	s->unshot.link = mem_new(t->links, 2 * channels * sizeof(double), "unshot flux", e);
 	s->shot = mem_new(t->rows, 2 * channels * sizeof(double), "shot flux", e);
 	s->ledger = mem_new(LEDGER_TERMS, channels * sizeof(double), "ledger", e);
-	return s->direct && s->caustic && s->indirect && s->error && s->error_direct &&
-	       s->discretisation && s->discretisation_direct && s->unshot_emission &&
-	       s->unshot_diffuse && s->unshot_link && s->shot && s->ledger ? 0 : -1;
+	return s->irradiance.direct && s->irradiance.caustic && s->irradiance.indirect && s->error.sampling && s->error.sampling_direct &&
+	       s->error.discretisation && s->error.discretisation_direct && s->unshot.emission &&
+	       s->unshot.diffuse && s->unshot.link && s->shot && s->ledger ? 0 : -1;
 }
 
 /* Flux that can be squared, for variances. */
 static const double brightest = 1e150;
 
-int solution_begin(struct solution *s, const struct model *m, const struct transport *t,
-                   int light_groups, struct err *e)
+int radiosity_begin(struct solution *s, const struct model *m, const struct transport *t,
+                    int light_groups, struct err *e)
 {
 	double all = 0;
 
 	*s = (struct solution){ .bands = m->bands };
-	if (light_groups_set(s, m, light_groups, e) || solution_arrays(s, m, t, e))
+	if (radiosity_groups_set(s, m, light_groups, e) || solution_arrays(s, m, t, e))
 		return -1;
 	for (uint32_t i = 0; i < s->sources; i++)
 		for (int k = 0; k < m->bands; k++) {
 			uint32_t group = solution_group(s, m, i);
-			double flux = solver_emitted(m, i, k);
-			s->unshot_emission[i * (size_t)m->bands + (size_t)k] = flux;
+			double flux = radiosity_emitted(m, i, k);
+			s->unshot.emission[i * (size_t)m->bands + (size_t)k] = flux;
 			s->ledger[group * (size_t)m->bands + (size_t)k] += flux;
 			all += flux;
 		}
@@ -71,7 +71,7 @@ int solution_begin(struct solution *s, const struct model *m, const struct trans
 
 /* Lights come before the first round, whatever they are worth: they shoot once. 0 when the
  * last shot stopped it. */
-static int shoot_lights(struct solver *v, uint64_t last_shot)
+static int shoot_lights(struct shooter *v, uint64_t last_shot)
 {
 	const struct solution *s = v->s;
 	size_t bands = (size_t)s->bands;
@@ -79,26 +79,26 @@ static int shoot_lights(struct solver *v, uint64_t last_shot)
 	for (uint32_t i = (uint32_t)s->patch_sides; i < s->sources; i++) {
 		double unshot = 0;
 		for (size_t k = 0; k < bands; k++)
-			unshot += s->unshot_emission[i * bands + k];
+			unshot += s->unshot.emission[i * bands + k];
 		if (!(unshot > 0))
 			continue;
 		if (s->shots >= last_shot)
 			return 0;
-		solver_shoot_light(v, i);
+		radiosity_shoot_light(v, i);
 	}
 	return 1;
 }
 
 /* Shoots the rest of the current round; 0 when the last shot stopped it. */
-static int finish_round(struct solver *v, uint64_t last_shot)
+static int finish_round(struct shooter *v, uint64_t last_shot)
 {
 	struct solution *s = v->s;
 	const double least = s->round[ROUND_LEAST];
 
 	for (uint32_t ps = (uint32_t)s->round[ROUND_NEXT]; ps < s->patch_sides; ps++) {
 		if (s->shots < last_shot) {
-			solver_shoot(v, ps, least);
-		} else if (solver_is_due(v, ps, least)) {
+			radiosity_shoot_side(v, ps, least);
+		} else if (radiosity_is_due(v, ps, least)) {
 			s->round[ROUND_NEXT] = ps;
 			return 0;
 		}
@@ -110,7 +110,7 @@ static int finish_round(struct solver *v, uint64_t last_shot)
 /* ---- when to overshoot ---- */
 
 /* Enters what has been read since the last time. */
-static void count_work(struct solver *v)
+static void count_work(struct shooter *v)
 {
 	v->s->round[ROUND_WORK] += (double)(v->sender.runs - v->counted);
 	v->counted = v->sender.runs;
@@ -118,7 +118,7 @@ static void count_work(struct solver *v)
 
 /* Whether shots would go on for longer than overshooting takes, by how much the last
  * sweeps (as many runs as there are) have brought. */
-static int is_slow(struct solver *v, double unshot, double stop)
+static int is_slow(struct shooter *v, double unshot, double stop)
 {
 	enum { SWEEPS = 2, WORTH = 20 };
 	double *round = v->s->round, sweeps = round[ROUND_WORK] / (double)v->t->runs;
@@ -133,7 +133,7 @@ static int is_slow(struct solver *v, double unshot, double stop)
 	return stop > 0 && log(unshot / stop) > WORTH * rate;
 }
 
-static void tell(const struct solver *v, const struct radiosity_hooks *hooks,
+static void tell(const struct shooter *v, const struct radiosity_hooks *hooks,
                  const struct radiosity_report *r)
 {
 	size_t bands = (size_t)v->s->bands;
@@ -154,39 +154,39 @@ static void tell(const struct solver *v, const struct radiosity_hooks *hooks,
 enum { DEPTH = 32 };
 
 /* Rounds, or overshooting where they are slow, until `stop` or the last shot. */
-static int rounds(struct solver *v, const struct radiosity_options *o,
+static int rounds(struct shooter *v, const struct radiosity_options *o,
                   const struct radiosity_hooks *hooks, struct radiosity_report *r,
                   struct err *e)
 {
 	struct solution *s = v->s;
 	uint64_t last = o->max_shots > UINT64_MAX - s->shots ? UINT64_MAX : s->shots + o->max_shots;
 	int go_on = shoot_lights(v, last);
-	double top = solver_survey(v, &r->unshot);
+	double top = radiosity_survey(v, &r->unshot);
 
 	while (go_on > 0 && (r->unshot > o->stop || s->round[ROUND_LEAST] != 0)) {
 		if (s->round[ROUND_LEAST] == 0 && s->shots >= last)
 			break;
 		if (s->round[ROUND_LEAST] == 0 && is_slow(v, r->unshot, o->stop)) {
-			go_on = solver_overshoot(v, r->unshot, o->stop, e);
+			go_on = radiosity_gmres_finish(v, r->unshot, o->stop, e);
 		} else {
 			if (s->round[ROUND_LEAST] == 0)
 				s->round[ROUND_LEAST] = top / DEPTH;
 			go_on = finish_round(v, last);
 		}
-		top = solver_survey(v, &r->unshot);
+		top = radiosity_survey(v, &r->unshot);
 		count_work(v);
 		r->rounds++;
 		tell(v, hooks, r);
 	}
-	sender_store(&v->sender, s);
+	radiosity_propagator_store(&v->sender, s);
 	return go_on < 0 ? -1 : 0;
 }
 
-static void report(const struct solver *v, int threads, struct radiosity_report *r)
+static void report(const struct shooter *v, int threads, struct radiosity_report *r)
 {
 	double emitted = 0;
 
-	for (size_t i = 0; i < v->parts.n; i++) {
+	for (size_t i = 0; i < v->components.n; i++) {
 		double part = 0;
 		for (size_t g = 0; g < v->s->groups; g++)
 			part += v->emitted[i * v->s->groups + g];
@@ -197,20 +197,20 @@ static void report(const struct solver *v, int threads, struct radiosity_report 
 	r->guessed = v->guessed / emitted;
 	r->passes = v->t->runs ? (double)v->sender.runs / (double)v->t->runs : 0;
 	r->solve_bytes = v->sender.bytes;
-	r->bound = radiosity_tail_bound(v->t, &v->parts, v->s, threads, &r->solve_bytes) / emitted;
+	r->bound = radiosity_truncation_bound(v->t, &v->components, v->s, threads, &r->solve_bytes) / emitted;
 }
 
 int radiosity_shoot(struct solution *s, const struct transport *t,
                     const struct radiosity_options *o, const struct radiosity_hooks *hooks,
                     struct radiosity_report *r, struct err *e)
 {
-	struct solver v;
+	struct shooter v;
 
 	*r = (struct radiosity_report){ 0 };
-	int bad = solver_init(&v, s, t, e) || components_need_sink(t, e) ||
+	int bad = radiosity_shooter_init(&v, s, t, e) || radiosity_components_need_sink(t, e) ||
 	          rounds(&v, o, hooks, r, e);
 	if (!bad)
 		report(&v, o->threads, r);
-	solver_free(&v);
+	radiosity_shooter_free(&v);
 	return bad ? -1 : 0;
 }

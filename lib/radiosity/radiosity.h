@@ -51,10 +51,10 @@ struct radiosity_report {
 };
 
 /* Zeroed state for a model and its transport with all emission unshot; light_groups: see
- * light_groups_set. 0, or -1 and e ("no emitter" if nothing emits, or if that is too much
+ * radiosity_groups_set. 0, or -1 and e ("no emitter" if nothing emits, or if that is too much
  * to compute with). */
-int solution_begin(struct solution *s, const struct model *m, const struct transport *t,
-                   int light_groups, struct err *e);
+int radiosity_begin(struct solution *s, const struct model *m, const struct transport *t,
+                    int light_groups, struct err *e);
 
 /* Shoots until `stop` or max_shots. Where the rest would take many more sweeps over all
  * sides, it is solved for and shot at once (gmres.c), which may leave unshot flux of
@@ -66,13 +66,13 @@ int radiosity_shoot(struct solution *s, const struct transport *t,
 
 /* Irradiance of all element-sides and its standard error from what the rows have
  * sent. O(entries). 0, or -1 and e. */
-int radiosity_gather(struct solution *s, const struct transport *t, int threads,
-                     struct radiosity_report *r, struct err *e);
+int radiosity_element_irradiance(struct solution *s, const struct transport *t, int threads,
+                                 struct radiosity_report *r, struct err *e);
 
 /* An upper bound of the flux that will still arrive anywhere because of what is unshot;
  * INFINITY if it cannot be bounded. Adds to *bytes what it reads of runs.
  * O(runs x steps), at most 64 steps. */
-double radiosity_tail_bound(const struct transport *t, const struct components *parts,
-                            const struct solution *s, int threads, double *bytes);
+double radiosity_truncation_bound(const struct transport *t, const struct components *parts,
+                                  const struct solution *s, int threads, double *bytes);
 
 #endif

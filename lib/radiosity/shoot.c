@@ -13,29 +13,29 @@
 /* Less is no light: what becomes of it would not have all its digits. */
 static const double dimmest = 1e-200;
 
-double solver_emitted(const struct model *m, uint32_t source, int band)
+double radiosity_emitted(const struct model *m, uint32_t source, int band)
 {
 	double flux = 0;
 
-	if (source >= 2 * m->patches)
-		flux = light_flux(m, source - 2 * m->patches, band);
+	if (source >= 2 * m->patch.n)
+		flux = model_light_flux(m, source - 2 * m->patch.n, band);
 	else if (model_side_modelled(m, source))
-		flux = m->patch_area[source >> 1] *
+		flux = m->patch.area[source >> 1] *
 		       bsdf_exitance(&m->material, model_patch_material(m, source >> 1),
 		                     (int)(source & 1), band);
 	return flux > dimmest ? flux : 0;
 }
 
-static void weigh_components(struct solver *v)
+static void weigh_components(struct shooter *v)
 {
 	const struct solution *s = v->s;
 	size_t bands = (size_t)s->bands, vectors = v->sender.vectors;
 
 	for (uint32_t i = 0; i < s->sources; i++)
 		for (int k = 0; k < s->bands; k++)
-			v->emitted[v->parts.of[i] * s->groups + solution_group(s, v->t->m, i)] +=
-				solver_emitted(v->t->m, i, k);
-	for (size_t i = 0; i < v->parts.n; i++)
+			v->emitted[v->components.of[i] * s->groups + solution_group(s, v->t->m, i)] +=
+				radiosity_emitted(v->t->m, i, k);
+	for (size_t i = 0; i < v->components.n; i++)
 		for (size_t c = 0; c < v->sender.channels; c++) {
 			double emitted = v->emitted[i * s->groups + c / bands];
 			((double *)(v->weight + i * vectors))[c] = emitted > 0 ? 1 / emitted : 0;
@@ -51,7 +51,7 @@ static double row_cost(const struct transport *t, uint32_t row)
 	return (double)(t->block[end].run - t->block[b].run + HEAD * (1 + end - b));
 }
 
-static void set_costs(struct solver *v)
+static void set_costs(struct shooter *v)
 {
 	const struct transport *t = v->t;
 
@@ -70,9 +70,9 @@ static void set_costs(struct solver *v)
 	}
 }
 
-static int new_arrays(struct solver *v, struct err *e)
+static int new_arrays(struct shooter *v, struct err *e)
 {
-	size_t parts = v->parts.n, vectors = v->sender.vectors, sides = v->s->patch_sides;
+	size_t parts = v->components.n, vectors = v->sender.vectors, sides = v->s->patch_sides;
 
 	v->emitted = mem_new(parts * v->s->groups, sizeof *v->emitted, "priorities", e);
 	v->cost = mem_new(sides, sizeof *v->cost, "priorities", e);
@@ -87,12 +87,12 @@ static int new_arrays(struct solver *v, struct err *e)
 	       v->emission && v->diffuse && v->unshot ? 0 : -1;
 }
 
-int solver_init(struct solver *v, struct solution *s, const struct transport *t,
-                struct err *e)
+int radiosity_shooter_init(struct shooter *v, struct solution *s, const struct transport *t,
+                           struct err *e)
 {
-	*v = (struct solver){ .s = s, .t = t };
-	if (sender_init(&v->sender, t, s->groups, e) || sender_load(&v->sender, s, e) ||
-	    sent_new(&v->sent, v->sender.vectors, e) || components_init(&v->parts, t, e) ||
+	*v = (struct shooter){ .s = s, .t = t };
+	if (radiosity_propagator_init(&v->sender, t, s->groups, e) || radiosity_propagator_load(&v->sender, s, e) ||
+	    radiosity_shot_ledger_new(&v->sent, v->sender.vectors, e) || radiosity_components_init(&v->components, t, e) ||
 	    new_arrays(v, e))
 		return -1;
 	weigh_components(v);
@@ -100,21 +100,21 @@ int solver_init(struct solver *v, struct solution *s, const struct transport *t,
 	return 0;
 }
 
-void solver_free(struct solver *v)
+void radiosity_shooter_free(struct shooter *v)
 {
 	for (size_t i = 0; i < sizeof v->room / sizeof *v->room; i++)
 		free(v->room[i]);
 	free(v->emitted);
 	free(v->cost);
 	free(v->link_cost);
-	sent_free(&v->sent);
-	sender_free(&v->sender);
-	components_free(&v->parts);
+	radiosity_shot_ledger_free(&v->sent);
+	radiosity_propagator_free(&v->sender);
+	radiosity_components_free(&v->components);
 }
 
 /* ---- unshot flux ---- */
 
-static void check_ledger(struct solver *v)
+static void check_ledger(struct shooter *v)
 {
 	const struct solution *s = v->s;
 	size_t channels = v->sender.channels;
@@ -138,13 +138,13 @@ static inline void raise(double *top, double x)
 
 /* Counts items of unshot flux of a source, each two at a cost; the largest magnitude by
  * weight and cost. Inlined with the number of vectors, n; few are summed in registers. */
-static ALWAYS_INLINE double count_as(struct solver *v, uint32_t source, const lanes *flux,
+static ALWAYS_INLINE double count_as(struct shooter *v, uint32_t source, const lanes *flux,
                                      size_t items, const double *cost, size_t n, int few)
 {
-	const lanes *weight = v->weight + v->parts.of[source] * n;
+	const lanes *weight = v->weight + v->components.of[source] * n;
 	lanes here[2 * FEW] = { 0 }, below = { 0 };
 	lanes *all = few ? here : v->unshot;
-	lanes *part = few ? here + FEW : v->part + v->parts.of[source] * n;
+	lanes *part = few ? here + FEW : v->part + v->components.of[source] * n;
 	double top = 0;
 
 	for (size_t k = 0; k < items; k++, flux += n) {
@@ -160,13 +160,13 @@ static ALWAYS_INLINE double count_as(struct solver *v, uint32_t source, const la
 	}
 	for (size_t i = 0; few && i < n; i++) {
 		v->unshot[i] += all[i];
-		v->part[v->parts.of[source] * n + i] += part[i];
+		v->part[v->components.of[source] * n + i] += part[i];
 	}
 	v->negative |= lanes_total(&below, 1) > 0;
 	return top;
 }
 
-static double count(struct solver *v, uint32_t source, const lanes *flux, size_t items,
+static double count(struct shooter *v, uint32_t source, const lanes *flux, size_t items,
                     const double *cost)
 {
 	switch (v->sender.vectors) {
@@ -177,12 +177,12 @@ static double count(struct solver *v, uint32_t source, const lanes *flux, size_t
 }
 
 /* The most that a component has unshot of a group, over what it emits of it. */
-static double worst_part(const struct solver *v)
+static double worst_part(const struct shooter *v)
 {
 	const size_t bands = (size_t)v->s->bands;
 	double worst = 0;
 
-	for (size_t i = 0; i < v->parts.n; i++)
+	for (size_t i = 0; i < v->components.n; i++)
 		for (size_t g = 0; g < v->s->groups; g++) {
 			const double *part = (double *)(v->part + i * v->sender.vectors) + g * bands;
 			double sum = 0;
@@ -193,13 +193,13 @@ static double worst_part(const struct solver *v)
 	return worst;
 }
 
-static void load_emission(const struct solver *v, uint32_t source, lanes *to)
+static void load_emission(const struct shooter *v, uint32_t source, lanes *to)
 {
 	size_t bands = (size_t)v->s->bands;
 
 	memset(to, 0, v->sender.vectors * sizeof *to);
 	memcpy((double *)to + solution_group(v->s, v->t->m, source) * bands,
-	       v->s->unshot_emission + source * bands, bands * sizeof(double));
+	       v->s->unshot.emission + source * bands, bands * sizeof(double));
 }
 
 /* Magnitude of flux by weight. */
@@ -212,16 +212,16 @@ static inline double weigh(const lanes *weight, const lanes *flux, size_t n)
 	return lanes_total(&sum, 1);
 }
 
-static const lanes *weight_of(const struct solver *v, uint32_t source)
+static const lanes *weight_of(const struct shooter *v, uint32_t source)
 {
-	return v->weight + v->parts.of[source] * v->sender.vectors;
+	return v->weight + v->components.of[source] * v->sender.vectors;
 }
 
 /* What a side emits and has to send diffusely, by weight. */
-static double weigh_own(const struct solver *v, uint32_t ps)
+static double weigh_own(const struct shooter *v, uint32_t ps)
 {
 	const size_t bands = (size_t)v->s->bands, n = v->sender.vectors;
-	const double *emission = v->s->unshot_emission + ps * bands;
+	const double *emission = v->s->unshot.emission + ps * bands;
 	const double *weight = (const double *)weight_of(v, ps);
 	double flux = 0;
 
@@ -231,15 +231,15 @@ static double weigh_own(const struct solver *v, uint32_t ps)
 	       weigh(weight_of(v, ps), v->sender.unshot_diffuse + ps * n, n);
 }
 
-double solver_survey(struct solver *v, double *worst)
+double radiosity_survey(struct shooter *v, double *worst)
 {
 	const struct transport *t = v->t;
-	struct sender *s = &v->sender;
+	struct propagator *s = &v->sender;
 	size_t vectors = s->vectors;
 	double top = 0;
 
 	memset(v->unshot, 0, vectors * sizeof *v->unshot);
-	memset(v->part, 0, v->parts.n * vectors * sizeof *v->part);
+	memset(v->part, 0, v->components.n * vectors * sizeof *v->part);
 	v->negative = 0;
 	for (uint32_t i = 0; i < v->s->sources; i++) {
 		const int is_light = i >= v->s->patch_sides;
@@ -267,14 +267,14 @@ static int reaches(double flux, double cost, double least)
 	return flux > 0 && flux >= least * cost;
 }
 
-static int own_is_due(const struct solver *v, uint32_t ps, double least)
+static int own_is_due(const struct shooter *v, uint32_t ps, double least)
 {
 	return reaches(weigh_own(v, ps), v->cost[ps], least);
 }
 
 /* The first link of a side from l on that is due, by link and freshness; or where its
  * links end. */
-static uint64_t next_link(const struct solver *v, uint32_t ps, uint64_t l, double least)
+static uint64_t next_link(const struct shooter *v, uint32_t ps, uint64_t l, double least)
 {
 	const size_t n = v->sender.vectors;
 	const uint64_t end = 2 * v->t->target_link[ps + 1];
@@ -287,7 +287,7 @@ static uint64_t next_link(const struct solver *v, uint32_t ps, uint64_t l, doubl
 	return l;
 }
 
-int solver_is_due(const struct solver *v, uint32_t ps, double least)
+int radiosity_is_due(const struct shooter *v, uint32_t ps, double least)
 {
 	return own_is_due(v, ps, least) ||
 	       next_link(v, ps, 2 * v->t->target_link[ps], least) < 2 * v->t->target_link[ps + 1];
@@ -296,7 +296,7 @@ int solver_is_due(const struct solver *v, uint32_t ps, double least)
 /* ---- shots ---- */
 
 /* Sends flux by a row, scaled by channel if `share` is given. */
-static void shoot_row(struct solver *v, uint32_t row, int freshness, const lanes *from,
+static void shoot_row(struct shooter *v, uint32_t row, int freshness, const lanes *from,
                       const lanes *share, double *shot)
 {
 	lanes flux[VECTORS_MAX];
@@ -310,19 +310,19 @@ static void shoot_row(struct solver *v, uint32_t row, int freshness, const lanes
 		shot += (2 * (size_t)row + (size_t)freshness) * channels;
 	for (size_t c = 0; shot && c < channels; c++)
 		shot[c] += ((const double *)flux)[c];
-	send_row(&v->sender, row, freshness, flux, &v->sent);
+	radiosity_propagate_row(&v->sender, row, freshness, flux, &v->sent);
 }
 
-void solver_send_diffuse(struct solver *v, uint32_t ps, const lanes *flux, double *shot)
+void radiosity_shoot_diffuse(struct shooter *v, uint32_t ps, const lanes *flux, double *shot)
 {
 	if (v->t->diffuse_row[ps] != FF_NO_ROW)
-		shoot_row(v, v->t->diffuse_row[ps], MIXED, flux, NULL, shot);
+		shoot_row(v, v->t->diffuse_row[ps], FROM_DIFFUSE, flux, NULL, shot);
 }
 
-void solver_send_link(struct solver *v, uint64_t l, const lanes *flux, double *shot)
+void radiosity_shoot_link(struct shooter *v, uint64_t l, const lanes *flux, double *shot)
 {
 	const struct transport *t = v->t;
-	const lanes *share = sender_share(&v->sender, t->link_target[l >> 1]);
+	const lanes *share = radiosity_propagator_share(&v->sender, t->link_target[l >> 1]);
 
 	for (uint64_t way = 0; way < 2; way++) {
 		uint32_t row = t->link_row[(l & ~(uint64_t)1) + way];
@@ -343,18 +343,18 @@ static void take(lanes *from, lanes *to, lanes *out, size_t vectors)
 }
 
 /* Fetches what sending a link reads and writes. */
-static void fetch_link(const struct solver *v, uint32_t ps, uint64_t l, int ahead)
+static void fetch_link(const struct shooter *v, uint32_t ps, uint64_t l, int ahead)
 {
 	const uint32_t *row = v->t->link_row + (l & ~(uint64_t)1);
 
 	for (int way = 0; l < 2 * v->t->target_link[ps + 1] && way < 2; way++)
 		if (row[way] != FF_NO_ROW)
-			send_fetch(&v->sender, row[way], (int)(l & 1), ahead);
+			radiosity_propagate_fetch(&v->sender, row[way], (int)(l & 1), ahead);
 }
 
 /* Links are short, so that reading them is waiting for memory: each is looked for three
  * ahead. Whether there were any. */
-static int shoot_links(struct solver *v, uint32_t ps, double least)
+static int shoot_links(struct shooter *v, uint32_t ps, double least)
 {
 	enum { AHEAD = 3 };
 	const struct transport *t = v->t;
@@ -371,7 +371,7 @@ static int shoot_links(struct solver *v, uint32_t ps, double least)
 		for (int k = AHEAD; k > 0; k--)
 			fetch_link(v, ps, l[k], k);
 		take(v->sender.unshot_link + l[0] * vectors, now, v->out, vectors);
-		solver_send_link(v, l[0], now, v->s->shot);
+		radiosity_shoot_link(v, l[0], now, v->s->shot);
 		memmove(l, l + 1, AHEAD * sizeof *l);
 		if (l[AHEAD] < end)
 			l[AHEAD] = next_link(v, ps, l[AHEAD] + 1, least);
@@ -379,7 +379,7 @@ static int shoot_links(struct solver *v, uint32_t ps, double least)
 	return 1;
 }
 
-void solver_book(struct solver *v, const lanes *out)
+void radiosity_book(struct shooter *v, const lanes *out)
 {
 	struct solution *s = v->s;
 	size_t channels = v->sender.channels;
@@ -399,20 +399,20 @@ void solver_book(struct solver *v, const lanes *out)
 			v->residual = fmax(v->residual,
 			                   fabs(taken[c] - gone - kept[c]) / s->ledger[c]);
 	}
-	sent_clear(&v->sent);
+	radiosity_shot_ledger_clear(&v->sent);
 }
 
-static void take_emission(struct solver *v, uint32_t source)
+static void take_emission(struct shooter *v, uint32_t source)
 {
 	size_t bands = (size_t)v->s->bands;
 
 	load_emission(v, source, v->emission);
-	memset(v->s->unshot_emission + source * bands, 0, bands * sizeof(double));
+	memset(v->s->unshot.emission + source * bands, 0, bands * sizeof(double));
 	for (size_t i = 0; i < v->sender.vectors; i++)
 		v->out[i] += v->emission[i];
 }
 
-static void shoot_own(struct solver *v, uint32_t ps)
+static void shoot_own(struct shooter *v, uint32_t ps)
 {
 	const struct transport *t = v->t;
 	size_t vectors = v->sender.vectors;
@@ -421,11 +421,11 @@ static void shoot_own(struct solver *v, uint32_t ps)
 	take_emission(v, ps);
 	take(v->sender.unshot_diffuse + ps * vectors, v->diffuse, v->out, vectors);
 	if (row != FF_NO_ROW)
-		shoot_row(v, row, FRESH, v->emission, NULL, v->s->shot);
-	solver_send_diffuse(v, ps, v->diffuse, v->s->shot);
+		shoot_row(v, row, FROM_EMITTER, v->emission, NULL, v->s->shot);
+	radiosity_shoot_diffuse(v, ps, v->diffuse, v->s->shot);
 }
 
-void solver_shoot(struct solver *v, uint32_t ps, double least)
+void radiosity_shoot_side(struct shooter *v, uint32_t ps, double least)
 {
 	const int own = own_is_due(v, ps, least);
 
@@ -434,16 +434,16 @@ void solver_shoot(struct solver *v, uint32_t ps, double least)
 		shoot_own(v, ps);
 	if (!shoot_links(v, ps, least) && !own)
 		return;
-	solver_book(v, v->out);
+	radiosity_book(v, v->out);
 	v->s->shots++;
 }
 
-void solver_shoot_light(struct solver *v, uint32_t source)
+void radiosity_shoot_light(struct shooter *v, uint32_t source)
 {
 	memset(v->out, 0, v->sender.vectors * sizeof *v->out);
 	take_emission(v, source);
-	shoot_row(v, v->t->light_row[source - v->s->patch_sides], FRESH, v->emission, NULL,
+	shoot_row(v, v->t->light_row[source - v->s->patch_sides], FROM_EMITTER, v->emission, NULL,
 	          v->s->shot);
-	solver_book(v, v->out);
+	radiosity_book(v, v->out);
 	v->s->shots++;
 }

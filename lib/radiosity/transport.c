@@ -16,26 +16,26 @@ static const char *receivers(const struct ff *f)
 static int check_parts(const struct ff **f, const char *const *names, size_t n, struct err *e)
 {
 	for (size_t i = 0; i < n; i++) {
-		if (f[i]->parts != f[0]->parts)
+		if (f[i]->shards != f[0]->shards)
 			return err_set(e, "%s: part %u of %u, but %s is one of %u; give all parts of "
-			               "one run of ffcalc", names[i], f[i]->part, f[i]->parts,
-			               names[0], f[0]->parts);
+			               "one run of ffcalc", names[i], f[i]->shard, f[i]->shards,
+			               names[0], f[0]->shards);
 		if (f[i]->to_patches != f[0]->to_patches)
 			return err_set(e, "%s: receivers are %s, but %s of %s; give all parts of "
 			               "one run of ffcalc", names[i], receivers(f[i]),
 			               receivers(f[0]), names[0]);
 		for (size_t k = 0; k < i; k++)
-			if (f[k]->part == f[i]->part)
+			if (f[k]->shard == f[i]->shard)
 				return err_set(e, "%s: overlaps %s, both are part %u of %u",
-				               names[i], names[k], f[i]->part, f[i]->parts);
+				               names[i], names[k], f[i]->shard, f[i]->shards);
 	}
-	for (uint32_t part = 1; part <= f[0]->parts; part++) {
+	for (uint32_t part = 1; part <= f[0]->shards; part++) {
 		size_t i = 0;
-		while (i < n && f[i]->part != part)
+		while (i < n && f[i]->shard != part)
 			i++;
 		if (i == n)
 			return err_set(e, "%s: part %u of %u is missing; run ffcalc --part %u/%u",
-			               names[0], part, f[0]->parts, part, f[0]->parts);
+			               names[0], part, f[0]->shards, part, f[0]->shards);
 	}
 	return 0;
 }
@@ -43,28 +43,28 @@ static int check_parts(const struct ff **f, const char *const *names, size_t n, 
 static int by_part(const void *a, const void *b)
 {
 	const struct ff *x = *(const struct ff *const *)a, *y = *(const struct ff *const *)b;
-	return (x->part > y->part) - (x->part < y->part);
+	return (x->shard > y->shard) - (x->shard < y->shard);
 }
 
 /* ---- chains: shard numbers -> common numbers ---- */
 
 static uint32_t *common_chains(struct transport *t, const struct ff *f, struct err *e)
 {
-	uint32_t *map = mem_new(f->chains, sizeof *map, "chains", e);
+	uint32_t *map = mem_new(f->chain.n, sizeof *map, "chains", e);
 	uint32_t *count = mem_new(t->chains.events, sizeof *count, "chains", e);
 	int bad = !map || !count;
 
-	for (size_t c = 0; !bad && c < f->chains; c++) {
+	for (size_t c = 0; !bad && c < f->chain.n; c++) {
 		memset(count, 0, t->chains.events * sizeof *count);
-		for (uint64_t i = f->chain_start[c]; !bad && i < f->chain_start[c + 1]; i++) {
-			uint32_t id = f->chain_event[i];
+		for (uint64_t i = f->chain.start[c]; !bad && i < f->chain.start[c + 1]; i++) {
+			uint32_t id = f->chain.event[i];
 			if (id >= 4 * t->m->material.n || t->chains.slot[id] == CHAIN_NONE)
 				bad = err_set(e, "form factors pass an ideal surface that the model "
 				              "does not have; run ffcalc again");
 			else
-				count[t->chains.slot[id]] = f->chain_count[i];
+				count[t->chains.slot[id]] = f->chain.count[i];
 		}
-		bad = bad || (map[c] = chains_find(&t->chains, count, e)) == CHAIN_NONE;
+		bad = bad || (map[c] = bsdf_chains_find(&t->chains, count, e)) == CHAIN_NONE;
 	}
 	free(count);
 	if (!bad)
@@ -77,12 +77,12 @@ static uint32_t *common_chains(struct transport *t, const struct ff *f, struct e
 
 static int size_arrays(struct transport *t, struct err *e)
 {
-	size_t sides = 2 * t->m->patches;
+	size_t sides = 2 * t->m->patch.n;
 
 	for (size_t i = 0; i < t->shards; i++) {
-		t->rows += t->shard[i]->rows;
-		t->blocks += t->shard[i]->blocks;
-		t->links += t->shard[i]->links;
+		t->rows += t->shard[i]->row.n;
+		t->blocks += t->shard[i]->block.n;
+		t->links += t->shard[i]->link.n;
 	}
 	if (t->links >= RUN_GUESSED - 2)
 		return err_set(e, "more than 2^31 links between directional patches; use larger "
@@ -114,23 +114,23 @@ static void put_rows(struct transport *t, uint32_t shard, const uint32_t *chain,
 {
 	const struct ff *f = t->shard[shard];
 
-	for (size_t r = 0; r < f->rows; r++) {
-		uint32_t ps = f->row_side[r];
+	for (size_t r = 0; r < f->row.n; r++) {
+		uint32_t ps = f->row.side[r];
 		t->row_side[row + r] = ps;
-		t->row_kind[row + r] = f->row_kind[r];
-		t->row_samples[row + r] = f->row_samples[r];
-		t->row_block[row + r + 1] = block + f->row_block[r + 1];
-		if (f->row_kind[r] == FF_DIFFUSE)
+		t->row_kind[row + r] = f->row.kind[r];
+		t->row_samples[row + r] = f->row.samples[r];
+		t->row_block[row + r + 1] = block + f->row.block[r + 1];
+		if (f->row.kind[r] == FF_DIFFUSE)
 			t->diffuse_row[ps] = (uint32_t)(row + r);
-		else if (f->row_kind[r] == FF_EMISSION)
+		else if (f->row.kind[r] == FF_EMISSION)
 			t->emission_row[ps] = (uint32_t)(row + r);
-		else if (f->row_kind[r] == FF_LIGHT)
-			t->light_row[ps - 2 * t->m->patches] = (uint32_t)(row + r);
+		else if (f->row.kind[r] == FF_LIGHT)
+			t->light_row[ps - 2 * t->m->patch.n] = (uint32_t)(row + r);
 	}
-	for (size_t b = 0; b < f->blocks; b++)
-		t->block[block + b] = (struct block){ .chain = chain[f->block_chain[b]],
-			.shard = shard, .local = b, .escape = f->block_escape[b], .black = f->block_black[b],
-			.lost = f->block_lost[b], .cut = f->block_cut[b] };
+	for (size_t b = 0; b < f->block.n; b++)
+		t->block[block + b] = (struct block){ .chain = chain[f->block.chain[b]],
+			.shard = shard, .local = b, .escape = f->block.escape[b], .black = f->block.black[b],
+			.lost = f->block.lost[b], .cut = f->block.cut[b] };
 }
 
 static int join(struct transport *t, int threads, struct err *e)
@@ -144,10 +144,10 @@ static int join(struct transport *t, int threads, struct err *e)
 		if ((bad = !chain))
 			break;
 		put_rows(t, i, chain, row, block);
-		transport_put_links(t->shard[i], chain, (uint32_t)row, (uint32_t)link, l + link);
-		row += t->shard[i]->rows;
-		block += t->shard[i]->blocks;
-		link += t->shard[i]->links;
+		radiosity_transport_put_links(t->shard[i], chain, (uint32_t)row, (uint32_t)link, l + link);
+		row += t->shard[i]->row.n;
+		block += t->shard[i]->block.n;
+		link += t->shard[i]->link.n;
 		free(chain);
 	}
 	for (size_t i = 0; !bad && i < t->m->light.n; i++)
@@ -155,27 +155,27 @@ static int join(struct transport *t, int threads, struct err *e)
 			bad = err_set(e, "form factors of light %s are missing; run ffcalc again",
 			              t->m->light.name[i]);
 	if (!bad) {
-		chains_tie(&t->chains);
-		transport_sort_links(t, l);
-		bad = transport_make_runs(t, l, threads, e);
+		bsdf_chains_tie(&t->chains);
+		radiosity_transport_sort_links(t, l);
+		bad = radiosity_transport_make_runs(t, l, threads, e);
 	}
 	free(l);
 	return bad ? -1 : 0;
 }
 
-int transport_init(struct transport *t, const struct model *m, const struct ff **f,
-                   const char *const *names, size_t n, int threads, struct err *e)
+int radiosity_transport_init(struct transport *t, const struct model *m, const struct ff **f,
+                             const char *const *names, size_t n, int threads, struct err *e)
 {
 	*t = (struct transport){ .m = m, .shard = f, .shards = n };
 	if (check_parts(f, names, n, e))
 		return -1;
 	qsort(f, n, sizeof *f, by_part);
-	if (chains_init(&t->chains, m, f[0]->chain_most, e) || size_arrays(t, e))
+	if (bsdf_chains_init(&t->chains, m, f[0]->chain.most, e) || size_arrays(t, e))
 		return -1;
 	return join(t, threads, e);
 }
 
-void transport_free(struct transport *t)
+void radiosity_transport_free(struct transport *t)
 {
 	void *array[] = { t->row_side, t->row_kind, t->row_samples, t->row_block,
 		t->diffuse_row, t->emission_row, t->light_row, t->block, t->run_target, t->run_sum,
@@ -183,6 +183,6 @@ void transport_free(struct transport *t)
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
-	chains_free(&t->chains);
+	bsdf_chains_free(&t->chains);
 	*t = (struct transport){ 0 };
 }

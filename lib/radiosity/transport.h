@@ -74,8 +74,8 @@ struct transport {
 /* Joins the shards (f[i] stay with the caller and must outlive t). They must be
  * parts 1..N of one whole, each once; names[i] is used in messages.
  * O(entries + links log links). 0, or -1 and e. */
-int transport_init(struct transport *t, const struct model *m, const struct ff **f,
-                   const char *const *names, size_t n, int threads, struct err *e);
-void transport_free(struct transport *t);
+int radiosity_transport_init(struct transport *t, const struct model *m, const struct ff **f,
+                             const char *const *names, size_t n, int threads, struct err *e);
+void radiosity_transport_free(struct transport *t);
 
 #endif

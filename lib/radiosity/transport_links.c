@@ -3,32 +3,32 @@
 #include <stdlib.h>
 #include <string.h>
 
-void transport_put_links(const struct ff *f, const uint32_t *chain, uint32_t row,
-                         uint32_t first, struct link_key *to)
+void radiosity_transport_put_links(const struct ff *f, const uint32_t *chain, uint32_t row,
+                                   uint32_t first, struct link_key *to)
 {
-	for (size_t i = 0; i < f->links; i++) {
-		to[i] = (struct link_key){ f->link_target[i], f->link_source[i], f->link_last[i],
-		                           chain[f->link_chain[i]], { FF_NO_ROW, FF_NO_ROW },
+	for (size_t i = 0; i < f->link.n; i++) {
+		to[i] = (struct link_key){ f->link.target[i], f->link.source[i], f->link.last[i],
+		                           chain[f->link.chain[i]], { FF_NO_ROW, FF_NO_ROW },
 		                           first + (uint32_t)i, { 0 } };
 		for (int k = 0; k < 2; k++)
-			if (f->link_row[2 * i + (size_t)k] != FF_NO_ROW)
-				to[i].row[k] = row + f->link_row[2 * i + (size_t)k];
-		memcpy(to[i].direction, &f->link_direction[3 * i], sizeof to[i].direction);
+			if (f->link.row[2 * i + (size_t)k] != FF_NO_ROW)
+				to[i].row[k] = row + f->link.row[2 * i + (size_t)k];
+		memcpy(to[i].direction, &f->link.direction[3 * i], sizeof to[i].direction);
 	}
 }
 
-void transport_sort_links(struct transport *t, struct link_key *l)
+void radiosity_transport_sort_links(struct transport *t, struct link_key *l)
 {
 	size_t i = 0;
 
 	if (t->links)
 		qsort(l, t->links, sizeof *l, link_key_order);
-	for (uint32_t ps = 0; ps < 2 * t->m->patches; ps++) {
+	for (uint32_t ps = 0; ps < 2 * t->m->patch.n; ps++) {
 		t->target_link[ps] = i;
 		while (i < t->links && l[i].target == ps)
 			i++;
 	}
-	t->target_link[2 * t->m->patches] = i;
+	t->target_link[2 * t->m->patch.n] = i;
 	for (i = 0; i < t->links; i++) {
 		t->link_target[i] = l[i].target;
 		memcpy(&t->link_row[2 * i], l[i].row, sizeof l[i].row);
@@ -37,9 +37,9 @@ void transport_sort_links(struct transport *t, struct link_key *l)
 
 static const float *arrival(const struct ff *f, size_t block, uint32_t target)
 {
-	for (uint64_t i = f->block_arrival[block]; i < f->block_arrival[block + 1]; i++)
-		if (f->arrival_target[i] == target)
-			return &f->arrival_direction[3 * i];
+	for (uint64_t i = f->block.arrival[block]; i < f->block.arrival[block + 1]; i++)
+		if (f->arrival.target[i] == target)
+			return &f->arrival.direction[3 * i];
 	return NULL;
 }
 
@@ -63,9 +63,9 @@ static uint32_t nearest_link(const struct transport *t, const struct link_key *l
 }
 
 /* The link for light of a source and chain, or the nearest. */
-uint32_t transport_find_link(const struct transport *t, const struct link_key *l,
-                             const struct block *block, uint32_t target, uint32_t source,
-                             struct known_link *known)
+uint32_t radiosity_transport_find_link(const struct transport *t, const struct link_key *l,
+                                       const struct block *block, uint32_t target, uint32_t source,
+                                       struct known_link *known)
 {
 	if (known->link && known->source == source && known->chain == block->chain)
 		return known->link - 1;

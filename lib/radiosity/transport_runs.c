@@ -29,10 +29,10 @@ static void set_kinds(struct pass *p)
 	const struct transport *t = p->t;
 	const struct materials *mt = &t->m->material;
 
-	for (uint32_t ps = 0; ps < 2 * t->m->patches; ps++) {
+	for (uint32_t ps = 0; ps < 2 * t->m->patch.n; ps++) {
 		uint32_t material = model_patch_material(t->m, ps >> 1);
 		int side = (int)(ps & 1);
-		size_t at = material_at(mt, material, side);
+		size_t at = model_material_at(mt, material, side);
 		int special = t->target_link[ps + 1] > t->target_link[ps], ideal = 0;
 		for (int k = 0; k < t->m->bands; k++)
 			special |= mt->tau_d[at + (size_t)k] > 0;
@@ -50,7 +50,7 @@ static void set_kinds(struct pass *p)
 
 static inline uint32_t target_of(const struct transport *t, const struct ff *f, uint32_t column)
 {
-	return f->to_patches ? column : 2 * t->m->element_patch[column >> 1] + (column & 1);
+	return f->to_patches ? column : 2 * t->m->element.patch[column >> 1] + (column & 1);
 }
 
 /* Entries come patch-side by patch-side. */
@@ -80,7 +80,7 @@ static ALWAYS_INLINE void add_entry(struct runs *r, uint32_t target, double valu
 static ALWAYS_INLINE void add_list(const struct transport *t, const struct ff *f, uint64_t b,
                                    struct runs *to, int sums)
 {
-	uint64_t word = ff_first_word(f, b), first = f->block_start[b], n = f->block_start[b + 1] - first;
+	uint64_t word = ff_first_word(f, b), first = f->block.start[b], n = f->block.start[b + 1] - first;
 	struct runs r = *to;
 
 	for (uint64_t i = 0; i < n; i++)
@@ -108,7 +108,7 @@ static ALWAYS_INLINE struct runs sum_block(const struct pass *p, const struct bl
 {
 	const struct transport *t = p->t;
 	const struct ff *f = t->shard[block->shard];
-	size_t at = (size_t)thread * 2 * t->m->patches;
+	size_t at = (size_t)thread * 2 * t->m->patch.n;
 	struct runs r = { p->target + at, p->sum + at, 0, UINT32_MAX, 0 };
 
 	if (ff_has_spans(f, block->local))
@@ -211,7 +211,7 @@ static void fill_block(const struct pass *p, const struct row_chains *c, struct 
 	struct transport *t = p->t;
 	struct runs r = sum_block(p, block, thread, 1);
 	const uint8_t *follows = followed_by(p, c, block, thread);
-	struct known_link *known = p->known + (size_t)thread * 2 * t->m->patches;
+	struct known_link *known = p->known + (size_t)thread * 2 * t->m->patch.n;
 	uint64_t to[SIDE_KINDS] = { block->run, block->special, block->ideal };
 
 	block->sum = block->escape + block->black + block->lost + block->cut;
@@ -226,7 +226,7 @@ static void fill_block(const struct pass *p, const struct row_chains *c, struct 
 			t->run_link[block->link + (at - block->special)] =
 				follows[p->surface[target]]
 					? RUN_FOLLOWED
-					: transport_find_link(t, p->link, block, target, source, &known[target]);
+					: radiosity_transport_find_link(t, p->link, block, target, source, &known[target]);
 	}
 }
 
@@ -254,7 +254,7 @@ static int add_onward(struct vec *list, size_t first, struct onward x, struct er
 			o[i].sum += x.sum;
 			return 0;
 		}
-	return vec_append(list, &x, 1, sizeof x, e);
+	return mem_append(list, &x, 1, sizeof x, e);
 }
 
 /* O(runs that are followed). */
@@ -303,10 +303,10 @@ static int runs_of(struct pass *p, int threads, struct err *e)
 	return list_onward(t, e);
 }
 
-int transport_make_runs(struct transport *t, const struct link_key *link, int threads,
-                        struct err *e)
+int radiosity_transport_make_runs(struct transport *t, const struct link_key *link, int threads,
+                                  struct err *e)
 {
-	size_t sides = 2 * t->m->patches, surfaces = 2 * t->m->material.n;
+	size_t sides = 2 * t->m->patch.n, surfaces = 2 * t->m->material.n;
 	size_t each = threads > 1 ? (size_t)threads : 1;
 	struct pass p = { .t = t, .link = link };
 

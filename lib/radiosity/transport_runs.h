@@ -7,7 +7,7 @@
 
 /* Fills run_target, run_sum, run_link and onward, and where each block's begin, from rows,
  * chains that are tied and links that are sorted. O(entries). 0, or -1 and e. */
-int transport_make_runs(struct transport *t, const struct link_key *link, int threads,
-                        struct err *e);
+int radiosity_transport_make_runs(struct transport *t, const struct link_key *link, int threads,
+                                  struct err *e);
 
 #endif

@@ -25,7 +25,7 @@ enum { STEPS = 64 };
 /* What is not proved to be smaller than this part of the bound is worth a step more. */
 static const double loose = .15;
 
-struct tail {
+struct bound {
 	const struct transport *t;
 	size_t bands, vectors;
 	const struct components *parts;
@@ -38,7 +38,7 @@ struct tail {
 	double bytes;         /* of runs read */
 };
 
-static void unit_rows(struct tail *x, struct sender *sender)
+static void unit_rows(struct bound *x, struct propagator *sender)
 {
 	const struct transport *t = x->t;
 	double one[BANDS_MAX];
@@ -47,7 +47,7 @@ static void unit_rows(struct tail *x, struct sender *sender)
 		one[k] = 1;
 	for (uint32_t r = 0; r < t->rows; r++) {
 		double *in = x->in + t->row_block[r] * x->bands;
-		send_block_flux(sender, r, one, in);
+		radiosity_propagate_block_flux(sender, r, one, in);
 		for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
 			for (size_t k = 0; k < x->bands; k++)
 				*in++ /= t->block[b].sum > 0 ? t->block[b].sum : 1;
@@ -70,12 +70,12 @@ static ALWAYS_INLINE lanes plain_step(const struct transport *t, const lanes *of
 }
 
 /* What a block's runs make of it. */
-static lanes block_step(const struct tail *x, const lanes *of, uint64_t b, size_t v)
+static lanes block_step(const struct bound *x, const lanes *of, uint64_t b, size_t v)
 {
 	const struct transport *t = x->t;
 	const struct block *block = &t->block[b];
 	const size_t n = x->vectors;
-	const lanes *without = of + 2 * t->m->patches * n;
+	const lanes *without = of + 2 * t->m->patch.n * n;
 	lanes sum = n == 1 ? plain_step(t, of, block->run, block->ideal, 1)
 	                   : plain_step(t, of + v, block->run, block->ideal, n);
 
@@ -87,14 +87,14 @@ static lanes block_step(const struct tail *x, const lanes *of, uint64_t b, size_
 }
 
 struct rows_job {
-	const struct tail *x;
+	const struct bound *x;
 	const lanes *of;
 };
 
 static void rows_step(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct rows_job *j = arg;
-	const struct tail *x = j->x;
+	const struct bound *x = j->x;
 	const struct transport *t = x->t;
 
 	(void)thread;
@@ -110,7 +110,7 @@ static void rows_step(void *arg, size_t begin, size_t end, int thread)
 	}
 }
 
-static void all_rows(struct tail *x, const lanes *of, int threads)
+static void all_rows(struct bound *x, const lanes *of, int threads)
 {
 	struct rows_job j = { x, of };
 
@@ -121,12 +121,12 @@ static void all_rows(struct tail *x, const lanes *of, int threads)
 
 /* What x->row has of the rows that flux arriving on a side leaves by, with lobes or
  * without. */
-static double side_step(const struct tail *x, uint32_t ps, int lobes, size_t k)
+static double side_step(const struct bound *x, uint32_t ps, int lobes, size_t k)
 {
 	const struct transport *t = x->t;
 	const struct materials *mt = &t->m->material;
 	uint32_t material = model_patch_material(t->m, ps >> 1);
-	size_t at = material_at(mt, material, (int)(ps & 1)) + k;
+	size_t at = model_material_at(mt, material, (int)(ps & 1)) + k;
 	double sum = 0, lobe[2] = { 0, 0 };
 
 	if (t->diffuse_row[ps] != FF_NO_ROW)
@@ -140,19 +140,19 @@ static double side_step(const struct tail *x, uint32_t ps, int lobes, size_t k)
 }
 
 /* D becomes T D, and is added to N; the ratios. */
-static void sides_step(struct tail *x)
+static void sides_step(struct bound *x)
 {
 	const struct model *m = x->t->m;
 
 	memset(x->ratio, 0, x->parts->n * x->bands * sizeof *x->ratio);
-	for (size_t i = 0; i < 4 * m->patches; i++) {
-		uint32_t ps = (uint32_t)(i % (2 * m->patches));
+	for (size_t i = 0; i < 4 * m->patch.n; i++) {
+		uint32_t ps = (uint32_t)(i % (2 * m->patch.n));
 		double *d = (double *)(x->d + i * x->vectors);
 		double *n = (double *)(x->n + i * x->vectors);
 		double *ratio = x->ratio + x->parts->of[ps] * x->bands;
 		for (size_t k = 0; k < x->bands; k++) {
 			double next = model_side_modelled(m, ps)
-			            ? side_step(x, ps, i < 2 * m->patches, k) : 0;
+			            ? side_step(x, ps, i < 2 * m->patch.n, k) : 0;
 			if (next > 0)
 				ratio[k] = fmax(ratio[k], next / d[k]);
 			d[k] = next;
@@ -163,15 +163,15 @@ static void sides_step(struct tail *x)
 
 /* The largest part of 1 + N anywhere that is not summed but bounded; infinite without
  * a bound. With `add` it is added to N. */
-static double remainder_of(struct tail *x, int add)
+static double remainder_of(struct bound *x, int add)
 {
 	double worst = 0;
 
-	for (size_t i = 0; i < 4 * x->t->m->patches; i++)
+	for (size_t i = 0; i < 4 * x->t->m->patch.n; i++)
 		for (size_t k = 0; k < x->bands; k++) {
 			double d = ((double *)(x->d + i * x->vectors))[k];
 			double *n = (double *)(x->n + i * x->vectors) + k;
-			double q = x->ratio[x->parts->of[i % (2 * x->t->m->patches)] * x->bands + k];
+			double q = x->ratio[x->parts->of[i % (2 * x->t->m->patch.n)] * x->bands + k];
 			if (x->dark[k])
 				continue;
 			double rest = !(d > 0) ? 0 : q < 1 ? d * q / (1 - q) : INFINITY;
@@ -183,9 +183,9 @@ static double remainder_of(struct tail *x, int add)
 }
 
 /* 1 + N. 0 if it has no bound. */
-static int arrivals(struct tail *x, int threads)
+static int arrivals(struct bound *x, int threads)
 {
-	const size_t all = 4 * x->t->m->patches * x->vectors;
+	const size_t all = 4 * x->t->m->patch.n * x->vectors;
 	double rest = INFINITY, before;
 
 	for (size_t i = 0; i < all; i++)
@@ -207,7 +207,7 @@ static int arrivals(struct tail *x, int threads)
 }
 
 /* What x->row makes of a row's unshot flux in all groups. */
-static double row_bound(const struct tail *x, uint32_t row, const double *unshot, size_t groups)
+static double row_bound(const struct bound *x, uint32_t row, const double *unshot, size_t groups)
 {
 	double sum = 0;
 
@@ -216,7 +216,7 @@ static double row_bound(const struct tail *x, uint32_t row, const double *unshot
 	return sum;
 }
 
-static double all_bounds(const struct tail *x, const struct solution *s)
+static double all_bounds(const struct bound *x, const struct solution *s)
 {
 	const struct transport *t = x->t;
 	size_t channels = solution_channels(s);
@@ -225,14 +225,14 @@ static double all_bounds(const struct tail *x, const struct solution *s)
 	for (uint32_t ps = 0; ps < s->patch_sides; ps++) {
 		uint32_t row = t->diffuse_row[ps], lobe = t->emission_row[ps];
 		sum += row_bound(x, lobe != FF_NO_ROW ? lobe : row,
-		                 s->unshot_emission + ps * x->bands, 1);
-		sum += row_bound(x, row, s->unshot_diffuse + ps * channels, s->groups);
+		                 s->unshot.emission + ps * x->bands, 1);
+		sum += row_bound(x, row, s->unshot.diffuse + ps * channels, s->groups);
 	}
 	for (size_t i = s->patch_sides; i < s->sources; i++)
 		sum += row_bound(x, t->light_row[i - s->patch_sides],
-		                 s->unshot_emission + i * x->bands, 1);
+		                 s->unshot.emission + i * x->bands, 1);
 	for (size_t l = 0; l < 2 * s->links; l++) {
-		const double *unshot = s->unshot_link + l * channels;
+		const double *unshot = s->unshot.link + l * channels;
 		const uint32_t *row = t->link_row + (l & ~(size_t)1);
 		sum += fmax(row_bound(x, row[0], unshot, s->groups),
 		            row_bound(x, row[1], unshot, s->groups));
@@ -240,14 +240,14 @@ static double all_bounds(const struct tail *x, const struct solution *s)
 	return sum;
 }
 
-static void find_dark(struct tail *x, const struct solution *s)
+static void find_dark(struct bound *x, const struct solution *s)
 {
 	const struct {
 		const double *flux;
 		size_t n;
-	} list[] = { { s->unshot_emission, s->sources * x->bands },
-	             { s->unshot_diffuse, s->patch_sides * solution_channels(s) },
-	             { s->unshot_link, 2 * s->links * solution_channels(s) } };
+	} list[] = { { s->unshot.emission, s->sources * x->bands },
+	             { s->unshot.diffuse, s->patch_sides * solution_channels(s) },
+	             { s->unshot.link, 2 * s->links * solution_channels(s) } };
 
 	memset(x->dark, 1, sizeof x->dark);
 	for (size_t l = 0; l < sizeof list / sizeof *list; l++)
@@ -256,13 +256,13 @@ static void find_dark(struct tail *x, const struct solution *s)
 				x->dark[i % x->bands] = 0;
 }
 
-double radiosity_tail_bound(const struct transport *t, const struct components *parts,
-                            const struct solution *s, int threads, double *bytes)
+double radiosity_truncation_bound(const struct transport *t, const struct components *parts,
+                                  const struct solution *s, int threads, double *bytes)
 {
 	struct err e = { 0 };
-	struct sender sender;
+	struct propagator sender;
 	size_t bands = (size_t)t->m->bands;
-	struct tail x = { .t = t, .bands = bands, .vectors = lanes_vectors(bands),
+	struct bound x = { .t = t, .bands = bands, .vectors = lanes_vectors(bands),
 	                  .parts = parts };
 	void *room[2];
 	double bound = INFINITY;
@@ -270,9 +270,9 @@ double radiosity_tail_bound(const struct transport *t, const struct components *
 	x.in = mem_new(t->blocks, bands * sizeof(double), "bound", &e);
 	x.row = mem_new(t->rows, bands * sizeof(double), "bound", &e);
 	x.ratio = mem_new(parts->n, bands * sizeof *x.ratio, "bound", &e);
-	x.d = lanes_new(4 * t->m->patches * x.vectors, &room[0], "bound", &e);
-	x.n = lanes_new(4 * t->m->patches * x.vectors, &room[1], "bound", &e);
-	if (sender_init(&sender, t, 1, &e) == 0 && x.in && x.row && x.ratio && x.d && x.n) {
+	x.d = lanes_new(4 * t->m->patch.n * x.vectors, &room[0], "bound", &e);
+	x.n = lanes_new(4 * t->m->patch.n * x.vectors, &room[1], "bound", &e);
+	if (radiosity_propagator_init(&sender, t, 1, &e) == 0 && x.in && x.row && x.ratio && x.d && x.n) {
 		unit_rows(&x, &sender);
 		find_dark(&x, s);
 		if (arrivals(&x, threads)) {
@@ -281,7 +281,7 @@ double radiosity_tail_bound(const struct transport *t, const struct components *
 		}
 		*bytes += x.bytes;
 	}
-	sender_free(&sender);
+	radiosity_propagator_free(&sender);
 	free(x.in);
 	free(x.row);
 	free(x.ratio);

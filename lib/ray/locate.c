@@ -38,13 +38,13 @@ static void halve(struct locator_node *n, const struct split *s, int second)
  * special order, so a stack of nodes to visit is kept. */
 static int fill_nodes(struct locator *l, struct vec *stack, uint32_t tri, struct err *e)
 {
-	int32_t at = l->m->triangle_split[tri];
+	int32_t at = l->m->triangle.split[tri];
 
 	if (at < 0)
 		return 0;
 	l->node[at] = (struct locator_node){ { 1, 0, 0 }, { -1, 1, 0 }, { -1, 0, 1 } };
 	stack->n = 0;
-	if (vec_append(stack, &at, 1, sizeof at, e))
+	if (mem_append(stack, &at, 1, sizeof at, e))
 		return -1;
 	while (stack->n) {
 		at = ((int32_t *)stack->data)[--stack->n];
@@ -54,7 +54,7 @@ static int fill_nodes(struct locator *l, struct vec *stack, uint32_t tri, struct
 				continue;
 			l->node[s->child[k]] = l->node[at];
 			halve(&l->node[s->child[k]], s, k);
-			if (vec_append(stack, &s->child[k], 1, sizeof at, e))
+			if (mem_append(stack, &s->child[k], 1, sizeof at, e))
 				return -1;
 		}
 	}
@@ -132,13 +132,13 @@ static int fill(struct locator *l, struct err *e)
 	struct vec stack = { 0 };
 	int bad = 0;
 
-	for (uint32_t t = 0; !bad && t < l->m->triangles; t++) {
+	for (uint32_t t = 0; !bad && t < l->m->triangle.n; t++) {
 		if (l->root[t] < 0)
 			continue;
 		const struct locator_grid *g = &l->grid[l->root[t]];
 		bad = fill_nodes(l, &stack, t, e);
 		if (!bad)
-			fill_square(l, l->cell + g->first, l->m->triangle_split[t],
+			fill_square(l, l->cell + g->first, l->m->triangle.split[t],
 			            (struct square){ g->size, 0, 0, g->size });
 	}
 	free(stack.data);
@@ -149,16 +149,16 @@ static int fill(struct locator *l, struct err *e)
 static int lay_grids(struct locator *l, uint64_t *cells, struct err *e)
 {
 	const struct model *m = l->m;
-	uint32_t *elements = mem_new(m->triangles, sizeof *elements, "element lookup", e);
+	uint32_t *elements = mem_new(m->triangle.n, sizeof *elements, "element lookup", e);
 	size_t grids = 0;
 
-	for (size_t i = 0; elements && i < m->elements; i++)
-		grids += elements[m->element_triangle[i]]++ == 1;
+	for (size_t i = 0; elements && i < m->element.n; i++)
+		grids += elements[m->element.triangle[i]]++ == 1;
 	l->grid = mem_new(grids, sizeof *l->grid, "element lookup", e);
 	*cells = grids = 0;
-	for (size_t t = 0; elements && l->grid && t < m->triangles; t++) {
+	for (size_t t = 0; elements && l->grid && t < m->triangle.n; t++) {
 		uint32_t n = grid_size(elements[t]);
-		l->root[t] = n ? (int32_t)grids : m->triangle_split[t];
+		l->root[t] = n ? (int32_t)grids : m->triangle.split[t];
 		if (!n)
 			continue;
 		l->grid[grids++] = (struct locator_grid){ *cells, n };
@@ -168,12 +168,12 @@ static int lay_grids(struct locator *l, uint64_t *cells, struct err *e)
 	return elements && l->grid ? 0 : -1;
 }
 
-int locator_init(struct locator *l, const struct model *m, struct err *e)
+int ray_locator_init(struct locator *l, const struct model *m, struct err *e)
 {
 	uint64_t cells;
 
 	*l = (struct locator){ .m = m };
-	l->root = mem_new(m->triangles, sizeof *l->root, "element lookup", e);
+	l->root = mem_new(m->triangle.n, sizeof *l->root, "element lookup", e);
 	l->node = mem_new(m->splits, sizeof *l->node, "element lookup", e);
 	if (!l->root || !l->node || lay_grids(l, &cells, e))
 		return -1;
@@ -181,7 +181,7 @@ int locator_init(struct locator *l, const struct model *m, struct err *e)
 	return l->cell ? fill(l, e) : -1;
 }
 
-void locator_free(struct locator *l)
+void ray_locator_free(struct locator *l)
 {
 	free(l->root);
 	free(l->grid);

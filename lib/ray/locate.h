@@ -26,14 +26,14 @@ struct locator {
 };
 
 /* O(elements log elements). m must outlive it. 0, or -1 and e. */
-int locator_init(struct locator *l, const struct model *m, struct err *e);
-void locator_free(struct locator *l);
+int ray_locator_init(struct locator *l, const struct model *m, struct err *e);
+void ray_locator_free(struct locator *l);
 
 /* The element that model_locate finds (its neighbour, within float32 rounding of their
  * common edge) for weights x, y of the triangle's corners 1 and 2, in two steps, so that
  * a loop over many hits can ask for the memory of each ahead: what is known of a hit's
  * place, and the way down from there. */
-static inline const int32_t *locate_begin(const struct locator *l, uint32_t tri, float x, float y)
+static inline const int32_t *ray_locate_begin(const struct locator *l, uint32_t tri, float x, float y)
 {
 	int32_t root = l->root[tri];
 
@@ -47,7 +47,7 @@ static inline const int32_t *locate_begin(const struct locator *l, uint32_t tri,
 	return &l->cell[g->first + (uint64_t)j * g->size + (uint64_t)i];
 }
 
-static inline uint32_t locate_below(const struct locator *l, int32_t at, float x, float y)
+static inline uint32_t ray_locate_below(const struct locator *l, int32_t at, float x, float y)
 {
 	if (at < 0)
 		return (uint32_t)~at;
@@ -66,9 +66,9 @@ static inline uint32_t locate_below(const struct locator *l, int32_t at, float x
 	return (uint32_t)~at;
 }
 
-static inline uint32_t locate(const struct locator *l, uint32_t tri, float x, float y)
+static inline uint32_t ray_locate(const struct locator *l, uint32_t tri, float x, float y)
 {
-	return locate_below(l, *locate_begin(l, tri, x, y), x, y);
+	return ray_locate_below(l, *ray_locate_begin(l, tri, x, y), x, y);
 }
 
 #endif

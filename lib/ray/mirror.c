@@ -15,8 +15,8 @@ enum { PLANES_MOST = 16 };
  * one plane differ by this. */
 static const double same_plane = 1e-6;
 
-int mirror_has(const struct mirrors *k, const struct mirror_plane *plane, uint32_t material,
-               int side, const double n[3], const double x[3])
+int ray_mirror_has(const struct mirrors *k, const struct mirror_plane *plane, uint32_t material,
+                   int side, const double n[3], const double x[3])
 {
 	return material == plane->material && side == plane->side &&
 	       v3_dot(n, plane->n) > 1 - same_plane &&
@@ -34,11 +34,11 @@ static void extend(struct mirror_plane *plane, const double x[3])
 static int add_plane(const struct model *m, struct mirrors *k, struct vec *list,
                      size_t triangle, int side, struct err *e)
 {
-	const uint32_t *c = &m->triangle[3 * triangle];
+	const uint32_t *c = &m->triangle.corner[3 * triangle];
 	const double *x[3];
 	struct mirror_plane new = { .side = side, .box = { { INFINITY, INFINITY, INFINITY },
 	                                                   { -INFINITY, -INFINITY, -INFINITY } },
-	                            .material = m->surface.material[m->triangle_surface[triangle]] };
+	                            .material = m->surface.material[m->triangle.surface[triangle]] };
 	struct mirror_plane *have = list->data;
 	size_t i = 0;
 
@@ -49,16 +49,16 @@ static int add_plane(const struct model *m, struct mirrors *k, struct vec *list,
 	for (int d = 0; d < 3 && side == BACK; d++)
 		new.n[d] = -new.n[d];
 	new.offset = v3_dot(x[0], new.n);
-	while (i < list->n && !mirror_has(k, &have[i], new.material, side, new.n, x[0]))
+	while (i < list->n && !ray_mirror_has(k, &have[i], new.material, side, new.n, x[0]))
 		i++;
-	if (i == list->n && vec_append(list, &new, 1, sizeof new, e))
+	if (i == list->n && mem_append(list, &new, 1, sizeof new, e))
 		return -1;
 	for (int d = 0; d < 3; d++)
 		extend((struct mirror_plane *)list->data + i, x[d]);
 	return 0;
 }
 
-int mirrors_find(const struct model *m, struct mirrors *k, struct err *e)
+int ray_mirrors_find(const struct model *m, struct mirrors *k, struct err *e)
 {
 	struct vec list = { 0 };
 	double size[3];
@@ -66,9 +66,9 @@ int mirrors_find(const struct model *m, struct mirrors *k, struct err *e)
 
 	v3_sub(m->light.box[1], m->light.box[0], size);
 	*k = (struct mirrors){ .same = same_plane * v3_length(size) };
-	for (size_t t = 0; !bad && t < m->triangles && list.n <= PLANES_MOST; t++)
+	for (size_t t = 0; !bad && t < m->triangle.n && list.n <= PLANES_MOST; t++)
 		for (int side = FRONT; !bad && side <= BACK; side++)
-			if (bsdf_has_ideal(&m->material, m->surface.material[m->triangle_surface[t]],
+			if (bsdf_has_ideal(&m->material, m->surface.material[m->triangle.surface[t]],
 			                   side, 0))
 				bad = add_plane(m, k, &list, t, side, e);
 	k->plane = list.data;
@@ -77,7 +77,7 @@ int mirrors_find(const struct model *m, struct mirrors *k, struct err *e)
 	return bad;
 }
 
-void mirrors_free(struct mirrors *k)
+void ray_mirrors_free(struct mirrors *k)
 {
 	free(k->plane);
 	*k = (struct mirrors){ 0 };
@@ -122,7 +122,7 @@ static double turn(const struct model *m, const struct mirrors *k, const struct 
                    uint32_t from, size_t plane, struct image *new)
 {
 	const struct mirror_plane *p = &k->plane[plane];
-	const double *rho = &m->material.rho_s[material_at(&m->material, p->material, p->side)];
+	const double *rho = &m->material.rho_s[model_material_at(&m->material, p->material, p->side)];
 	double most = 0;
 
 	*new = all[from];
@@ -145,7 +145,7 @@ static int list_lights(const struct model *m, struct vec *list, struct err *e)
 		memcpy(new.direction, &m->light.direction[3 * (size_t)i], sizeof new.direction);
 		for (int b = 0; b < m->bands; b++)
 			new.part[b] = 1;
-		if (vec_append(list, &new, 1, sizeof new, e))
+		if (mem_append(list, &new, 1, sizeof new, e))
 			return -1;
 	}
 	return 0;
@@ -169,7 +169,7 @@ static int list_images(const struct model *m, double clear, int orders, size_t m
 					continue;
 				if (order >= orders || list->n - m->light.n >= most)
 					g->complete = 0;
-				else if (vec_append(list, &new, 1, sizeof new, e))
+				else if (mem_append(list, &new, 1, sizeof new, e))
 					return -1;
 			}
 	return 0;
@@ -177,7 +177,7 @@ static int list_images(const struct model *m, double clear, int orders, size_t m
 
 static int new_arrays(const struct model *m, struct light_images *g, size_t n, struct err *e)
 {
-	if (lights_new(&g->l, n, m->bands, e))
+	if (model_lights_new(&g->l, n, m->bands, e))
 		return -1;
 	g->l.unit_flux = mem_new(n, sizeof *g->l.unit_flux, "images of lights", e);
 	g->l.cosine = mem_new(n, 2 * sizeof *g->l.cosine, "images of lights", e);
@@ -210,13 +210,13 @@ static void fill(const struct model *m, const struct image *list, struct light_i
 	}
 }
 
-int light_images_new(const struct model *m, double clear, int orders, size_t most,
-                     double least, struct light_images *g, struct err *e)
+int ray_light_images_new(const struct model *m, double clear, int orders, size_t most,
+                         double least, struct light_images *g, struct err *e)
 {
 	struct vec list = { 0 };
 
 	*g = (struct light_images){ 0 };
-	int bad = (m->light.n && mirrors_find(m, &g->mirrors, e)) || list_lights(m, &list, e) ||
+	int bad = (m->light.n && ray_mirrors_find(m, &g->mirrors, e)) || list_lights(m, &list, e) ||
 	          list_images(m, clear, orders, most, least, g, &list, e) ||
 	          new_arrays(m, g, list.n, e);
 	if (!bad)
@@ -225,10 +225,10 @@ int light_images_new(const struct model *m, double clear, int orders, size_t mos
 	return bad ? -1 : 0;
 }
 
-void light_images_free(struct light_images *g)
+void ray_light_images_free(struct light_images *g)
 {
-	mirrors_free(&g->mirrors);
-	lights_free(&g->l);
+	ray_mirrors_free(&g->mirrors);
+	model_lights_free(&g->l);
 	free(g->origin);
 	free(g->parent);
 	free(g->plane);

@@ -28,12 +28,12 @@ struct mirrors {
 };
 
 /* Needs derived lights. O(triangles). 0, or -1 and e; to be freed in any case. */
-int mirrors_find(const struct model *m, struct mirrors *k, struct err *e);
-void mirrors_free(struct mirrors *k);
+int ray_mirrors_find(const struct model *m, struct mirrors *k, struct err *e);
+void ray_mirrors_free(struct mirrors *k);
 
 /* 1 if a point of a side of a triangle, n its unit normal, is the mirror's. */
-int mirror_has(const struct mirrors *k, const struct mirror_plane *plane, uint32_t material,
-               int side, const double n[3], const double x[3]);
+int ray_mirror_has(const struct mirrors *k, const struct mirror_plane *plane, uint32_t material,
+                   int side, const double n[3], const double x[3]);
 
 /* Lights and behind them their images, those turned more often last. */
 struct light_images {
@@ -49,8 +49,8 @@ struct light_images {
  * `most` at most; `clear`: a light so close to a plane is
  * in it (ray_offset). O(triangles + images planes). 0, or -1 and e; to be freed in any
  * case. */
-int light_images_new(const struct model *m, double clear, int orders, size_t most,
-                     double least, struct light_images *g, struct err *e);
-void light_images_free(struct light_images *g);
+int ray_light_images_new(const struct model *m, double clear, int orders, size_t most,
+                         double least, struct light_images *g, struct err *e);
+void ray_light_images_free(struct light_images *g);
 
 #endif

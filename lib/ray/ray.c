@@ -55,15 +55,15 @@ static void bounds(const struct model *m, struct ray_scene *s)
 	double lo[3] = { INFINITY, INFINITY, INFINITY };
 	double hi[3] = { -INFINITY, -INFINITY, -INFINITY };
 
-	for (size_t i = 0; i < 3 * m->triangles; i++)
+	for (size_t i = 0; i < 3 * m->triangle.n; i++)
 		for (int k = 0; k < 3; k++) {
-			double x = m->vertex[3 * (size_t)m->triangle[i] + (size_t)k];
+			double x = m->vertex[3 * (size_t)m->triangle.corner[i] + (size_t)k];
 			lo[k] = fmin(lo[k], x);
 			hi[k] = fmax(hi[k], x);
 		}
 	s->unit = 0;
 	for (int k = 0; k < 3; k++) {
-		s->centre[k] = m->triangles ? lo[k] + (hi[k] - lo[k]) / 2 : 0;
+		s->centre[k] = m->triangle.n ? lo[k] + (hi[k] - lo[k]) / 2 : 0;
 		s->unit = fmax(s->unit, (hi[k] - lo[k]) / 2);
 	}
 	if (!(s->unit > 0))
@@ -82,7 +82,7 @@ static void to_unit(const struct ray_scene *s, const double x[3], float out[3])
  * hit the triangle that it has just left. */
 static int is_sliver(const struct ray_scene *s, const struct model *m, size_t triangle)
 {
-	const uint32_t *c = &m->triangle[3 * triangle];
+	const uint32_t *c = &m->triangle.corner[3 * triangle];
 	double n[3], longest = 0;
 
 	v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
@@ -97,14 +97,14 @@ static int is_sliver(const struct ray_scene *s, const struct model *m, size_t tr
 
 static int find_slivers(struct ray_scene *s, const struct model *m, struct err *e)
 {
-	for (size_t i = 0; i < m->triangles; i++)
+	for (size_t i = 0; i < m->triangle.n; i++)
 		s->slivers += (size_t)is_sliver(s, m, i);
 	s->sliver = mem_new(s->slivers, sizeof *s->sliver, "ray scene", e);
 	s->sliver_plane = mem_new(s->slivers, sizeof *s->sliver_plane, "ray scene", e);
 	if (!s->sliver || !s->sliver_plane)
 		return -1;
-	for (size_t i = 0, k = 0; i < m->triangles && k < s->slivers; i++) {
-		const uint32_t *c = &m->triangle[3 * i];
+	for (size_t i = 0, k = 0; i < m->triangle.n && k < s->slivers; i++) {
+		const uint32_t *c = &m->triangle.corner[3 * i];
 		double *plane = s->sliver_plane[k], x[3];
 		if (!is_sliver(s, m, i))
 			continue;
@@ -151,7 +151,7 @@ static int add_slivers(struct ray_scene *s, const struct model *m, RTCGeometry a
 		                           rtcGetGeometryBufferData(all, RTC_BUFFER_TYPE_VERTEX, 0), 0,
 		                           3 * sizeof(float), m->vertices);
 		for (size_t k = 0; k < s->slivers; k++)
-			memcpy(&t[3 * k], &m->triangle[3 * (size_t)s->sliver[k]], 3 * sizeof *t);
+			memcpy(&t[3 * k], &m->triangle.corner[3 * (size_t)s->sliver[k]], 3 * sizeof *t);
 		rtcSetGeometryUserData(g, s);
 		rtcSetGeometryIntersectFilterFunction(g, leave_slivers);
 		rtcSetGeometryOccludedFilterFunction(g, leave_slivers);
@@ -168,16 +168,16 @@ static int fill_geometry(struct ray_scene *s, const struct model *m, RTCGeometry
 	float *v = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
 	                                   3 * sizeof *v, m->vertices);
 	uint32_t *t = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-	                                      3 * sizeof *t, m->triangles);
+	                                      3 * sizeof *t, m->triangle.n);
 	if (!v || !t)
-		return err_set(e, "Embree: no memory for %zu triangles", m->triangles);
+		return err_set(e, "Embree: no memory for %zu triangles", m->triangle.n);
 	for (size_t i = 0; i < m->vertices; i++)
 		to_unit(s, &m->vertex[3 * i], &v[3 * i]);
-	memcpy(t, m->triangle, 3 * m->triangles * sizeof *t);
+	memcpy(t, m->triangle.corner, 3 * m->triangle.n * sizeof *t);
 	for (size_t k = 0; k < s->slivers; k++) /* an edge is never hit */
 		t[3 * (size_t)s->sliver[k] + 1] = t[3 * (size_t)s->sliver[k] + 2] = t[3 * (size_t)s->sliver[k]];
-	for (size_t i = 0; i < m->triangles; i++) {
-		const uint32_t *c = &m->triangle[3 * i];
+	for (size_t i = 0; i < m->triangle.n; i++) {
+		const uint32_t *c = &m->triangle.corner[3 * i];
 		double n[3];
 		v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
 		        &m->vertex[3 * (size_t)c[2]], n);
@@ -197,9 +197,9 @@ struct ray_scene *ray_scene_new(const struct model *m, struct err *e)
 	if (!s)
 		return NULL;
 	bounds(m, s);
-	s->coherent = m->triangles <= COHERENT_MOST;
-	s->normal = mem_new(m->triangles, sizeof *s->normal, "triangle normals", e);
-	s->device = rtcNewDevice(m->triangles <= ALONE_MOST ? "threads=1" : NULL);
+	s->coherent = m->triangle.n <= COHERENT_MOST;
+	s->normal = mem_new(m->triangle.n, sizeof *s->normal, "triangle normals", e);
+	s->device = rtcNewDevice(m->triangle.n <= ALONE_MOST ? "threads=1" : NULL);
 	if (s->normal && s->device) {
 		s->scene = rtcNewScene(s->device);
 		rtcSetSceneFlags(s->scene, RTC_SCENE_FLAG_ROBUST);
@@ -262,7 +262,7 @@ void ray_point(const struct ray_scene *s, const struct model *m, uint32_t triang
 	double n[3], w[3], sum = 0;
 
 	for (int i = 0; i < 3; i++)
-		corner[i] = &m->vertex[3 * (size_t)m->triangle[3 * (size_t)triangle + (size_t)i]];
+		corner[i] = &m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)triangle + (size_t)i]];
 	v3_area(corner[0], corner[1], corner[2], n);
 	double least = ray_inset(s, v3_length(n)) / 3;
 	for (int i = 0; i < 3; i++)

@@ -14,8 +14,8 @@ static void planes(struct pathtrace *p)
 {
 	const struct model *m = p->m;
 
-	for (size_t i = 0; i < m->triangles; i++) {
-		const uint32_t *c = &m->triangle[3 * i];
+	for (size_t i = 0; i < m->triangle.n; i++) {
+		const uint32_t *c = &m->triangle.corner[3 * i];
 		v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
 		        &m->vertex[3 * (size_t)c[2]], &p->normal[3 * i]);
 		p->area[i] = v3_normalise(&p->normal[3 * i]);
@@ -24,7 +24,7 @@ static void planes(struct pathtrace *p)
 
 static uint32_t material_of(const struct model *m, size_t triangle)
 {
-	return m->surface.material[m->triangle_surface[triangle]];
+	return m->surface.material[m->triangle.surface[triangle]];
 }
 
 /* Mean of the bands' fluxes; adds them to p->emitted. */
@@ -49,8 +49,8 @@ static double list_lights(struct pathtrace *p)
 	for (size_t i = 0; i < m->light.n; i++) {
 		double sum = 0;
 		for (int b = 0; b < m->bands; b++) {
-			p->emitted[b] += light_flux(m, i, b);
-			sum += light_flux(m, i, b) / m->bands;
+			p->emitted[b] += model_light_flux(m, i, b);
+			sum += model_light_flux(m, i, b) / m->bands;
 		}
 		p->light_below[i + 1] = p->light_below[i] + sum;
 	}
@@ -62,13 +62,13 @@ static int list_emitters(struct pathtrace *p, struct err *e)
 	struct vec list = { 0 };
 	double total = 0, lights = list_lights(p);
 
-	for (size_t i = 0; i < 2 * p->m->triangles; i++) {
+	for (size_t i = 0; i < 2 * p->m->triangle.n; i++) {
 		double flux = side_flux(p, i / 2, (int)(i % 2));
 		struct emitter one = { .triangle = (uint32_t)(i / 2), .side = (int)(i % 2),
 		                       .chance = flux, .below = total };
 		if (!(flux > 0))
 			continue;
-		if (vec_append(&list, &one, 1, sizeof one, e)) {
+		if (mem_append(&list, &one, 1, sizeof one, e)) {
 			free(list.data);
 			return -1;
 		}
@@ -98,13 +98,13 @@ struct pathtrace *pathtrace_new(const struct model *m, const struct ray_scene *r
 		return NULL;
 	p->m = m;
 	p->rays = rays;
-	p->normal = mem_new(m->triangles, 3 * sizeof *p->normal, "triangle normals", e);
-	p->area = mem_new(m->triangles, sizeof *p->area, "triangle areas", e);
-	p->density = mem_new(m->triangles, 2 * sizeof *p->density, "emitters", e);
+	p->normal = mem_new(m->triangle.n, 3 * sizeof *p->normal, "triangle normals", e);
+	p->area = mem_new(m->triangle.n, sizeof *p->area, "triangle areas", e);
+	p->density = mem_new(m->triangle.n, 2 * sizeof *p->density, "emitters", e);
 	p->light_below = mem_new(m->light.n + 1, sizeof *p->light_below, "lights", e);
 	if (p->normal && p->area && p->density && p->light_below) {
 		planes(p);
-		if (!list_emitters(p, e) && !light_ways_new(m, rays, &p->ways, e))
+		if (!list_emitters(p, e) && !ray_light_visibility_new(m, rays, &p->ways, e))
 			return p;
 	}
 	pathtrace_free(p);
@@ -120,7 +120,7 @@ void pathtrace_free(struct pathtrace *p)
 	free(p->density);
 	free(p->emitter);
 	free(p->light_below);
-	light_ways_free(&p->ways);
+	ray_light_visibility_free(&p->ways);
 	free(p);
 }
 

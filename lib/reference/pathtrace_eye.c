@@ -83,7 +83,7 @@ static void add_direct(const struct pathtrace *p, const struct eye_path *path,
 		return;
 	bsdf_eval(m, v->material, v->n, wi, wo, f);
 	double back[3] = { -wi[0], -wi[1], -wi[2] };
-	bsdf_emission(m, m->surface.material[m->triangle_surface[at->triangle]], n, back, l);
+	bsdf_emission(m, m->surface.material[m->triangle.surface[at->triangle]], n, back, l);
 	for (int b = 0; b < m->bands; b++) {
 		f[b] *= l[b] * path->throughput[b];
 		any = fmax(any, f[b]);
@@ -92,7 +92,7 @@ static void add_direct(const struct pathtrace *p, const struct eye_path *path,
 		return;
 	pathtrace_leave(p, v->n, v->x, wi, from);
 	pathtrace_leave(p, n, y, back, to);
-	if (!light_through(&p->ways, from, to, f, &rays))
+	if (!ray_light_transmittance(&p->ways, from, to, f, &rays))
 		return;
 	double pdf = at->chance / p->area[at->triangle] * distance * distance / fabs(cosine);
 	double other = bsdf_pdf(m, v->material, v->n, wo, BSDF_FROM_EYE, wi);
@@ -110,7 +110,7 @@ static double sight(const struct pathtrace *p, const struct vertex *v, size_t li
 	const double *intensity = &l->intensity[light * (size_t)p->m->bands];
 	double sum = 0;
 
-	light_see(l, light, v->x, ray_offset(p->rays), s);
+	model_light_see(l, light, v->x, ray_offset(p->rays), s);
 	for (int b = 0; b < p->m->bands; b++)
 		sum += intensity[b] / p->m->bands;
 	return sum * s->across * s->falloff * fabs(v3_dot(v->n, s->toward));
@@ -137,7 +137,7 @@ static void add_light(const struct pathtrace *p, const struct eye_path *path,
 	if (!(any > 0))
 		return;
 	pathtrace_leave(p, v->n, v->x, s.toward, from);
-	if (!light_way(&p->ways, light, from, &s, f, &rays))
+	if (!ray_light_visibility(&p->ways, light, from, &s, f, &rays))
 		return;
 	for (int b = 0; b < m->bands; b++)
 		radiance[b] += f[b];
@@ -241,8 +241,8 @@ static void sample_pixel(const struct render *j, size_t pixel, long sample, doub
 		light[d] = rng_sobol(index, 2 + d, batch);
 	double x = j->o->centre ? .5 : rng_sobol(index, 0, batch);
 	double y = j->o->centre ? .5 : rng_sobol(index, 1, batch);
-	camera_ray(j->f, (double)(pixel % width) + x, (double)(pixel / width) + y, path.org,
-	           path.dir);
+	picture_camera_ray(j->f, (double)(pixel % width) + x, (double)(pixel / width) + y, path.org,
+	                   path.dir);
 	follow(j->p, &path, light, &r, radiance);
 }
 
@@ -258,7 +258,7 @@ static void put(const struct render *j, size_t pixel, int first, const double *v
 
 	for (int c = 0; c < 3 + extra; c++) {
 		int b = c < 3 ? (c < bands ? c : bands - 1) : c - 3;
-		image_plane(j->picture, first + c)[pixel] = (float)value[b];
+		picture_image_plane(j->picture, first + c)[pixel] = (float)value[b];
 	}
 }
 
@@ -316,7 +316,7 @@ static int new_picture(const struct render *j, struct err *e)
 			snprintf(text[c], LENGTH, "%sband.%d", prefix, c % n - 3);
 		name[c] = text[c];
 	}
-	return image_new(j->picture, j->f->width, j->f->height, channels, name, e);
+	return picture_image_new(j->picture, j->f->width, j->f->height, channels, name, e);
 }
 
 static double relative_rms(const struct image *picture, int first_error)
@@ -326,9 +326,9 @@ static double relative_rms(const struct image *picture, int first_error)
 
 	for (int c = 0; c < 3; c++)
 		for (size_t i = 0; i < pixels; i++) {
-			double error = image_plane(picture, first_error + c)[i];
+			double error = picture_image_plane(picture, first_error + c)[i];
 			squares += error * error;
-			sum += image_plane(picture, c)[i];
+			sum += picture_image_plane(picture, c)[i];
 		}
 	double n = 3 * (double)pixels;
 	return sum > 0 ? sqrt(squares / n) / (sum / n) : 0;

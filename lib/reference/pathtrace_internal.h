@@ -26,7 +26,7 @@ struct pathtrace {
 	double emitted[BANDS_MAX]; /* flux, also of lights */
 	double *light_below;       /* [lights+1] sum of the chances of the lights before, by flux
 	                              among all that emits */
-	struct light_ways ways;
+	struct light_visibility ways;
 };
 
 /* A surface point as a ray meets it. */

@@ -38,9 +38,9 @@ static void emit_light(const struct pathtrace *p, double u, struct rng *r, doubl
 
 	while (i + 1 < m->light.n && u >= p->light_below[i + 1])
 		i++;
-	light_ray(&m->light, i, ray, ray_offset(p->rays), org, dir);
+	model_light_ray(&m->light, i, ray, ray_offset(p->rays), org, dir);
 	for (int b = 0; b < m->bands; b++)
-		flux[b] = light_flux(m, i, b) / (p->light_below[i + 1] - p->light_below[i]);
+		flux[b] = model_light_flux(m, i, b) / (p->light_below[i + 1] - p->light_below[i]);
 }
 
 /* A ray from a point of an emitter, with flux[bands] per particle. */
@@ -53,14 +53,14 @@ static void emit_patch(const struct pathtrace *p, struct rng *r, double org[3], 
 	for (int i = 0; i < 5; i++)
 		u[i] = rng_uniform(r);
 	const struct emitter *at = pathtrace_emitter(p, u, x);
-	size_t material = m->surface.material[m->triangle_surface[at->triangle]];
+	size_t material = m->surface.material[m->triangle.surface[at->triangle]];
 	for (int k = 0; k < 3; k++) {
 		double n = p->normal[3 * (size_t)at->triangle + (size_t)k];
 		normal[k] = at->side == FRONT ? n : -n;
 	}
 	/* radiance cos^(m-1), times the cosine of the projected area */
-	lobe_sample_whole(m->material.emission_exponent[2 * material + (size_t)at->side],
-	                  normal, u + 3, dir);
+	bsdf_lobe_sample_whole(m->material.emission_exponent[2 * material + (size_t)at->side],
+	                       normal, u + 3, dir);
 	pathtrace_leave(p, normal, x, dir, org);
 	for (int b = 0; b < m->bands; b++)
 		flux[b] = bsdf_exitance(&m->material, material, at->side, b) *
@@ -164,11 +164,11 @@ static void finish(const struct pathtrace *p, const struct pathtrace_options *o,
                    struct pathtrace_irradiance *out)
 {
 	const struct model *m = p->m;
-	size_t bands = (size_t)m->bands, rows = 2 * m->elements;
+	size_t bands = (size_t)m->bands, rows = 2 * m->element.n;
 	double batches = (double)batch_count(o), scale = 1 / (batches * (batches - 1));
 
 	for (size_t i = 0; i < rows * bands; i++) {
-		double area = m->element_area[i / bands / 2];
+		double area = m->element.area[i / bands / 2];
 		out->h[i] = mean[i] / area;
 		out->error[i] = (mean[i] > 0 ? sqrt(squares[i] * scale)
 		                             : p->emitted[i % bands] / (double)o->samples) / area;
@@ -184,7 +184,7 @@ int pathtrace_particles(const struct pathtrace *p, const struct pathtrace_option
                         const struct progress *progress, struct pathtrace_irradiance *out,
                         struct err *e)
 {
-	size_t bands = (size_t)p->m->bands, rows = 2 * p->m->elements;
+	size_t bands = (size_t)p->m->bands, rows = 2 * p->m->element.n;
 	struct shower s = { .p = p, .o = o, .values = (rows + 1) * bands };
 	double *mean, *squares;
 	int bad = -1;

@@ -66,7 +66,7 @@ static void gather_parts(const struct model *m, size_t material, const double n[
 	 * that is the side across from the known direction. */
 	int side = p->cosine > 0 ? FRONT : BACK;
 	int across = transport == BSDF_FROM_LIGHT ? side : !side;
-	size_t r = material_at(mt, material, side), t = material_at(mt, material, across);
+	size_t r = model_material_at(mt, material, side), t = model_material_at(mt, material, across);
 	if (!black_side(mt, material, side)) {
 		double k = mt->alpha[2 * material + (size_t)side];
 		add_part(p, BSDF_DIFFUSE_R, &mt->rho_d[r], 0, mt->bands);
@@ -93,7 +93,7 @@ static double lobe_pdf(enum lobe_kind kind, double k, double power, double cos_a
 {
 	if (kind == LOBE_RECIPROCAL)
 		return (k + 1) / (2 * pi) * power;
-	return power / lobe_normaliser(k, cos_axis);
+	return power / bsdf_lobe_normaliser(k, cos_axis);
 }
 
 /* f of a lobe with unit coefficient from its density about the known direction's
@@ -106,7 +106,7 @@ static double lobe_f(enum lobe_kind kind, double k, double power, double density
 		return density / fmax(a, b);
 	if (transport == BSDF_FROM_LIGHT)
 		return density / b;
-	return power / (lobe_normaliser(k, b) * a);
+	return power / (bsdf_lobe_normaliser(k, b) * a);
 }
 
 /* f(wi -> wo) into f[bands] (unless NULL) and the sampling density of the unknown
@@ -131,8 +131,8 @@ static double evaluate(const struct model *m, const struct parts *p, const doubl
 			continue;
 		if (part->event == BSDF_LOBE_R || part->event == BSDF_LOBE_T) {
 			/* R.w = 2 (n.l)(n.w) - l.w; T.w = -l.w */
-			double power = lobe_power(part->k,
-			                          crosses ? -along : 2 * p->cosine * cos_w - along);
+			double power = bsdf_lobe_power(part->k,
+			                               crosses ? -along : 2 * p->cosine * cos_w - along);
 			if (power == 0)
 				continue;
 			density = lobe_pdf(m->lobe, part->k, power, a);
@@ -202,15 +202,15 @@ static void draw(const struct model *m, const struct part *part, double cosine,
 		axis[i] = -known[i];
 	}
 	if (!transmits(part->event))
-		lobe_mirror(known, n, axis);
+		bsdf_lobe_mirror(known, n, axis);
 	if (part->event == BSDF_DIFFUSE_R || part->event == BSDF_DIFFUSE_T)
-		lobe_sample_cosine(normal, u, w);
+		bsdf_sample_cosine(normal, u, w);
 	else if (isinf(part->k))
 		memcpy(w, axis, sizeof axis);
 	else if (m->lobe == LOBE_RECIPROCAL)
-		lobe_sample_whole(part->k, axis, u, w);
+		bsdf_lobe_sample_whole(part->k, axis, u, w);
 	else
-		lobe_sample(part->k, axis, normal, u, w);
+		bsdf_lobe_sample(part->k, axis, normal, u, w);
 }
 
 void bsdf_sample(const struct model *m, size_t material, const double n[3],
@@ -252,7 +252,7 @@ void bsdf_emission(const struct model *m, size_t material, const double n[3],
 	int side = cosine > 0 ? FRONT : BACK, dark = cosine == 0 || black_side(mt, material, side);
 	double exponent = mt->emission_exponent[2 * material + (size_t)side];
 	double scale = dark ? 0 : exponent == 1 ? 1 : pow(fabs(cosine), exponent - 1);
-	const double *emission = &mt->emission[material_at(mt, material, side)];
+	const double *emission = &mt->emission[model_material_at(mt, material, side)];
 
 	for (int b = 0; b < mt->bands; b++)
 		l[b] = scale * emission[b];
@@ -264,13 +264,13 @@ double bsdf_exitance(const struct materials *mt, size_t material, int side, int 
 
 	if (black_side(mt, material, side))
 		return 0;
-	return 2 * pi * mt->emission[material_at(mt, material, side) + (size_t)band] /
+	return 2 * pi * mt->emission[model_material_at(mt, material, side) + (size_t)band] /
 	       (exponent + 1);
 }
 
 double bsdf_albedo(const struct materials *mt, size_t material, int side, int band)
 {
-	size_t at = material_at(mt, material, side) + (size_t)band;
+	size_t at = model_material_at(mt, material, side) + (size_t)band;
 
 	if (black_side(mt, material, side))
 		return 0;
@@ -285,7 +285,7 @@ static int has_finite(const struct materials *mt, size_t material, int side,
 	const double *c = transmitted ? mt->tau_s : mt->rho_s;
 
 	return !black_side(mt, material, side) && finite == (k < (double)INFINITY) &&
-	       band_mean(&c[material_at(mt, material, side)], mt->bands) > 0;
+	       band_mean(&c[model_material_at(mt, material, side)], mt->bands) > 0;
 }
 
 int bsdf_has_lobe(const struct materials *mt, size_t material, int side, int transmitted)
@@ -309,5 +309,5 @@ int bsdf_any_pane(const struct materials *mt)
 int bsdf_emits(const struct materials *mt, size_t material, int side)
 {
 	return !black_side(mt, material, side) &&
-	       band_mean(&mt->emission[material_at(mt, material, side)], mt->bands) > 0;
+	       band_mean(&mt->emission[model_material_at(mt, material, side)], mt->bands) > 0;
 }

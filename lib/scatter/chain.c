@@ -11,7 +11,7 @@ static int rehash(struct chains *c, size_t size, struct err *e);
 static int changes_no_colour(const struct materials *mt, uint32_t id)
 {
 	const double *coefficient = id & 1 ? mt->tau_s : mt->rho_s;
-	size_t at = material_at(mt, id / 4, (int)(id / 2 % 2));
+	size_t at = model_material_at(mt, id / 4, (int)(id / 2 % 2));
 
 	for (int k = 0; k < mt->bands; k++)
 		if (coefficient[at + (size_t)k] != 1)
@@ -35,7 +35,7 @@ static void find_events(struct chains *c, const struct materials *mt, uint32_t m
 	}
 }
 
-int chains_init(struct chains *c, const struct model *m, uint32_t most, struct err *e)
+int bsdf_chains_init(struct chains *c, const struct model *m, uint32_t most, struct err *e)
 {
 	size_t ids = 4 * m->material.n;
 
@@ -49,14 +49,14 @@ int chains_init(struct chains *c, const struct model *m, uint32_t most, struct e
 	find_events(c, &m->material, most);
 	uint32_t *none = mem_new(c->events, sizeof *none, "chains", e);
 	/* Rows of no events must have an address too. */
-	int bad = !none || vec_reserve(&c->count, 1, sizeof *none, e) ||
-	          vec_reserve(&c->child, 1, sizeof *none, e) || rehash(c, 64, e) ||
-	          chains_find(c, none, e) == CHAIN_NONE;
+	int bad = !none || mem_reserve(&c->count, 1, sizeof *none, e) ||
+	          mem_reserve(&c->child, 1, sizeof *none, e) || rehash(c, 64, e) ||
+	          bsdf_chains_find(c, none, e) == CHAIN_NONE;
 	free(none);
 	return bad ? -1 : 0;
 }
 
-void chains_free(struct chains *c)
+void bsdf_chains_free(struct chains *c)
 {
 	free(c->event);
 	free(c->slot);
@@ -84,7 +84,7 @@ static size_t place(const struct chains *c, const uint32_t *count)
 	size_t at = hash_counts(count, c->events) & (c->hash_size - 1);
 
 	while (c->hash[at] != CHAIN_NONE &&
-	       memcmp(chains_count(c, c->hash[at]), count, c->events * sizeof *count))
+	       memcmp(bsdf_chains_count(c, c->hash[at]), count, c->events * sizeof *count))
 		at = (at + 1) & (c->hash_size - 1);
 	return at;
 }
@@ -100,11 +100,11 @@ static int rehash(struct chains *c, size_t size, struct err *e)
 	c->hash = hash;
 	c->hash_size = size;
 	for (uint32_t i = 0; i < c->n; i++)
-		c->hash[place(c, chains_count(c, i))] = i;
+		c->hash[place(c, bsdf_chains_count(c, i))] = i;
 	return 0;
 }
 
-uint32_t chains_find(struct chains *c, const uint32_t *count, struct err *e)
+uint32_t bsdf_chains_find(struct chains *c, const uint32_t *count, struct err *e)
 {
 	size_t at = place(c, count);
 	uint32_t length = 0;
@@ -117,9 +117,9 @@ uint32_t chains_find(struct chains *c, const uint32_t *count, struct err *e)
 	}
 	for (uint32_t i = 0; i < c->events; i++)
 		length += count[i];
-	if (vec_append(&c->count, count, c->events, sizeof *count, e) ||
-	    vec_append(&c->length, &length, 1, sizeof length, e) ||
-	    vec_reserve(&c->child, c->events, sizeof(uint32_t), e))
+	if (mem_append(&c->count, count, c->events, sizeof *count, e) ||
+	    mem_append(&c->length, &length, 1, sizeof length, e) ||
+	    mem_reserve(&c->child, c->events, sizeof(uint32_t), e))
 		return CHAIN_NONE;
 	memset((uint32_t *)c->child.data + c->child.n, 0xff, c->events * sizeof(uint32_t));
 	c->child.n += c->events;
@@ -129,27 +129,27 @@ uint32_t chains_find(struct chains *c, const uint32_t *count, struct err *e)
 	return (uint32_t)(c->n - 1);
 }
 
-uint32_t chains_child(struct chains *c, uint32_t chain, uint32_t event, struct err *e)
+uint32_t bsdf_chains_child(struct chains *c, uint32_t chain, uint32_t event, struct err *e)
 {
 	size_t at = (size_t)chain * c->events + event;
 	uint32_t child = ((uint32_t *)c->child.data)[at];
 
 	if (child != CHAIN_NONE)
 		return child;
-	if (chains_count(c, chain)[event] >= c->most[event])
+	if (bsdf_chains_count(c, chain)[event] >= c->most[event])
 		return ((uint32_t *)c->child.data)[at] = chain;
 	uint32_t *count = mem_new(c->events, sizeof *count, "chains", e);
 	if (!count)
 		return CHAIN_NONE;
-	memcpy(count, chains_count(c, chain), c->events * sizeof *count);
+	memcpy(count, bsdf_chains_count(c, chain), c->events * sizeof *count);
 	count[event]++;
-	child = chains_find(c, count, e);
+	child = bsdf_chains_find(c, count, e);
 	free(count);
 	((uint32_t *)c->child.data)[at] = child;
 	return child;
 }
 
-void chains_tie(struct chains *c)
+void bsdf_chains_tie(struct chains *c)
 {
 	for (uint32_t i = 1; i < c->n; i++) {
 		uint32_t *count = (uint32_t *)c->count.data + (size_t)i * c->events;
@@ -167,17 +167,17 @@ void chains_tie(struct chains *c)
 	}
 }
 
-uint32_t chains_reverse(struct chains *c, uint32_t chain, struct err *e)
+uint32_t bsdf_chains_reverse(struct chains *c, uint32_t chain, struct err *e)
 {
 	uint32_t *count, found = CHAIN_NONE;
 	int passes = 1;
 
-	if (chains_length(c, chain) == 0)
+	if (bsdf_chains_length(c, chain) == 0)
 		return chain;
 	if (!(count = mem_new(c->events, sizeof *count, "chains", e)))
 		return CHAIN_NONE;
 	for (uint32_t i = 0; i < c->events; i++) {
-		uint32_t n = chains_count(c, chain)[i], id = c->event[i];
+		uint32_t n = bsdf_chains_count(c, chain)[i], id = c->event[i];
 		uint32_t to = c->slot[id & 1 ? id ^ 2 : id];
 		if (n && to == CHAIN_NONE)
 			passes = 0;
@@ -185,7 +185,7 @@ uint32_t chains_reverse(struct chains *c, uint32_t chain, struct err *e)
 			count[to] = n < c->most[to] ? n : c->most[to];
 	}
 	if (passes)
-		found = chains_find(c, count, e);
+		found = bsdf_chains_find(c, count, e);
 	free(count);
 	return found;
 }

@@ -35,31 +35,31 @@ struct chains {
 
 /* Finds the model's directional events and makes the empty chain, number 0. most: where
  * counts of ideal events stop that change colours. 0, or -1 and e. */
-int chains_init(struct chains *c, const struct model *m, uint32_t most, struct err *e);
-void chains_free(struct chains *c);
+int bsdf_chains_init(struct chains *c, const struct model *m, uint32_t most, struct err *e);
+void bsdf_chains_free(struct chains *c);
 
 /* The chain with these counts [events], made if new; CHAIN_NONE and e when out
  * of memory. O(events). */
-uint32_t chains_find(struct chains *c, const uint32_t *count, struct err *e);
+uint32_t bsdf_chains_find(struct chains *c, const uint32_t *count, struct err *e);
 
 /* The chain after one more event (by index). */
-uint32_t chains_child(struct chains *c, uint32_t chain, uint32_t event, struct err *e);
+uint32_t bsdf_chains_child(struct chains *c, uint32_t chain, uint32_t event, struct err *e);
 
 /* Ties every chain to the chains it comes from, where these exist: afterwards
  * `child` is complete and can be read without making chains. O(chains events^2). */
-void chains_tie(struct chains *c);
+void bsdf_chains_tie(struct chains *c);
 
 /* The chain as light sees it that travels the other way: straight-through events
  * are met from the other side. CHAIN_NONE where such light cannot pass (without
  * an error) or when out of memory. */
-uint32_t chains_reverse(struct chains *c, uint32_t chain, struct err *e);
+uint32_t bsdf_chains_reverse(struct chains *c, uint32_t chain, struct err *e);
 
-static inline uint32_t chains_length(const struct chains *c, uint32_t chain)
+static inline uint32_t bsdf_chains_length(const struct chains *c, uint32_t chain)
 {
 	return ((const uint32_t *)c->length.data)[chain];
 }
 
-static inline const uint32_t *chains_count(const struct chains *c, uint32_t chain)
+static inline const uint32_t *bsdf_chains_count(const struct chains *c, uint32_t chain)
 {
 	return (const uint32_t *)c->count.data + (size_t)chain * c->events;
 }

@@ -5,7 +5,7 @@
 
 enum { RGB = 3 };
 
-const struct rules_gltf rules_gltf_default = {
+const struct bsdf_gltf bsdf_gltf_default = {
 	.base = { 1, 1, 1 },
 	.opacity = 1,
 	.metallic = 1,
@@ -21,7 +21,7 @@ static double unit(double x)
 	return fmin(fmax(x, 0), 1);
 }
 
-double rules_exponent(double roughness)
+double bsdf_lobe_exponent(double roughness)
 {
 	double r2 = unit(roughness) * unit(roughness);
 
@@ -30,14 +30,14 @@ double rules_exponent(double roughness)
 
 /* Reflectance at normal incidence: Fresnel against air, with the factor and
  * colour of KHR_materials_specular. */
-static double dielectric_f0(const struct rules_gltf *g, int band)
+static double dielectric_f0(const struct bsdf_gltf *g, int band)
 {
 	double q = (g->ior - 1) / (g->ior + 1);
 
 	return unit(unit(q * q * g->specular_colour[band]) * unit(g->specular));
 }
 
-static void split(const struct rules_gltf *g, struct rules_side *s)
+static void split(const struct bsdf_gltf *g, struct bsdf_side *s)
 {
 	double m = unit(g->metallic), t = unit(g->transmission);
 	double d = unit(g->diffuse_transmission);
@@ -51,7 +51,7 @@ static void split(const struct rules_gltf *g, struct rules_side *s)
 		s->tau_d[b] = unit(scattered * d * cd);
 		s->rho_d[b] = unit(scattered * (1 - d) * c);
 	}
-	s->alpha = s->beta = rules_exponent(g->roughness);
+	s->alpha = s->beta = bsdf_lobe_exponent(g->roughness);
 }
 
 static double sum(const double *x, int bands)
@@ -63,19 +63,19 @@ static double sum(const double *x, int bands)
 	return total;
 }
 
-static enum rules_fate judge(double share, double exponent, double min_directional,
-                             double min_exponent)
+static enum bsdf_fate judge(double share, double exponent, double min_directional,
+                            double min_exponent)
 {
 	if (!(share > 0))
-		return RULES_NONE;
+		return BSDF_NONE;
 	if (exponent < min_exponent)
-		return RULES_WIDE;
-	return share < min_directional ? RULES_WEAK : RULES_KEPT;
+		return BSDF_WIDE;
+	return share < min_directional ? BSDF_WEAK : BSDF_KEPT;
 }
 
-static void fold(double *lobe, double *diffuse, enum rules_fate fate)
+static void fold(double *lobe, double *diffuse, enum bsdf_fate fate)
 {
-	if (fate == RULES_KEPT || fate == RULES_NONE)
+	if (fate == BSDF_KEPT || fate == BSDF_NONE)
 		return;
 	for (int b = 0; b < RGB; b++) {
 		diffuse[b] += lobe[b];
@@ -83,8 +83,8 @@ static void fold(double *lobe, double *diffuse, enum rules_fate fate)
 	}
 }
 
-void rules_from_gltf(const struct rules_gltf *g, double min_directional,
-                     double min_exponent, struct rules_side *s, struct rules_folding *f)
+void bsdf_from_gltf(const struct bsdf_gltf *g, double min_directional,
+                    double min_exponent, struct bsdf_side *s, struct bsdf_folding *f)
 {
 	double a = unit(g->opacity);
 	double *part[] = { s->rho_d, s->tau_d, s->rho_s, s->tau_s };
@@ -103,8 +103,8 @@ void rules_from_gltf(const struct rules_gltf *g, double min_directional,
 	f->transmitted_share = total > 0 ? sum(s->tau_s, RGB) / total : 0;
 	f->reflected = judge(f->reflected_share, s->alpha, min_directional, min_exponent);
 	f->transmitted = judge(f->transmitted_share, s->beta, min_directional, min_exponent);
-	if (f->transmitted == RULES_KEPT && a < 1 && !isinf(s->beta))
-		f->transmitted = RULES_PANE;
+	if (f->transmitted == BSDF_KEPT && a < 1 && !isinf(s->beta))
+		f->transmitted = BSDF_PANE;
 	fold(s->rho_s, s->rho_d, f->reflected);
 	fold(s->tau_s, s->tau_d, f->transmitted);
 	if (a < 1) {
@@ -112,24 +112,24 @@ void rules_from_gltf(const struct rules_gltf *g, double min_directional,
 			s->tau_s[b] += 1 - a;
 		s->beta = INFINITY;
 	}
-	rules_normalise(s, RGB);
+	bsdf_side_normalise(s, RGB);
 }
 
-double rules_albedo(const struct rules_side *s, int band)
+double bsdf_side_albedo(const struct bsdf_side *s, int band)
 {
 	return s->rho_d[band] + s->tau_d[band] + s->rho_s[band] + s->tau_s[band];
 }
 
-void rules_rescale(struct rules_side *s, int band)
+void bsdf_side_rescale(struct bsdf_side *s, int band)
 {
 	double *part[] = { s->rho_d, s->tau_d, s->rho_s, s->tau_s };
-	double scale = 1 / rules_albedo(s, band);
+	double scale = 1 / bsdf_side_albedo(s, band);
 
 	for (int p = 0; p < 4; p++)
 		part[p][band] *= scale;
 }
 
-void rules_normalise(struct rules_side *s, int bands)
+void bsdf_side_normalise(struct bsdf_side *s, int bands)
 {
 	if (!(sum(s->rho_s, bands) > 0))
 		s->alpha = INFINITY;
@@ -137,12 +137,12 @@ void rules_normalise(struct rules_side *s, int bands)
 		s->beta = INFINITY;
 }
 
-int rules_transmits(const struct rules_side *s, int bands)
+int bsdf_side_transmits(const struct bsdf_side *s, int bands)
 {
 	return sum(s->tau_d, bands) > 0 || sum(s->tau_s, bands) > 0;
 }
 
-double rules_luminance(const double rgb[3])
+double bsdf_luminance(const double rgb[3])
 {
 	return .2126 * rgb[0] + .7152 * rgb[1] + .0722 * rgb[2];
 }

@@ -6,14 +6,14 @@
 #include "lib/data/model.h"
 
 /* Coefficients of one side. */
-struct rules_side {
+struct bsdf_side {
 	double rho_d[BANDS_MAX], tau_d[BANDS_MAX], rho_s[BANDS_MAX], tau_s[BANDS_MAX];
 	double alpha, beta; /* INFINITY = ideal */
 };
 
 /* glTF's parameters. Inputs outside [0,1] are clamped, but for ior and
  * specular_colour (any value >= 0). */
-struct rules_gltf {
+struct bsdf_gltf {
 	double base[3];
 	double opacity;              /* constant alpha of alphaMode BLEND, else 1 */
 	double metallic, roughness;
@@ -23,19 +23,19 @@ struct rules_gltf {
 };
 
 /* The default material of glTF 2.0: white, metallic 1, roughness 1, ior 1.5. */
-extern const struct rules_gltf rules_gltf_default;
+extern const struct bsdf_gltf bsdf_gltf_default;
 
 /* What became of a directional part. */
-enum rules_fate {
-	RULES_NONE,  /* there was none */
-	RULES_KEPT,
-	RULES_WEAK,  /* folded into the diffuse part: its share is too small */
-	RULES_WIDE,  /* folded: its exponent is too small */
-	RULES_PANE   /* folded: the exponent belongs to the pane of alphaMode BLEND */
+enum bsdf_fate {
+	BSDF_NONE,  /* there was none */
+	BSDF_KEPT,
+	BSDF_WEAK,  /* folded into the diffuse part: its share is too small */
+	BSDF_WIDE,  /* folded: its exponent is too small */
+	BSDF_PANE   /* folded: the exponent belongs to the pane of alphaMode BLEND */
 };
 
-struct rules_folding {
-	enum rules_fate reflected, transmitted;
+struct bsdf_folding {
+	enum bsdf_fate reflected, transmitted;
 	double reflected_share, transmitted_share; /* of the summed albedo */
 	double exponent;                           /* of both lobes before folding */
 };
@@ -44,7 +44,7 @@ struct rules_folding {
  * half-vector exponent 2/r^4 - 2 of Beckmann width r^2 (Walter et al. 2007, with
  * glTF's alpha = r^2), a quarter of it about R, as the angle to R is about twice
  * the angle of the half vector to n (Phong against Blinn-Phong). 0 gives INFINITY. */
-double rules_exponent(double roughness);
+double bsdf_lobe_exponent(double roughness);
 
 /* Three bands of one side (both sides are alike):
  *   rho_s = m c + (1-m) F0, tau_s = (1-m)(1-F0) t c,
@@ -52,24 +52,24 @@ double rules_exponent(double roughness);
  * all times the opacity a, plus an ideal tau_s of 1 - a. A lobe whose share of the
  * albedo, summed over the bands, is below min_directional, or whose exponent is
  * below min_exponent, becomes diffuse; the sum of the coefficients does not change. */
-void rules_from_gltf(const struct rules_gltf *g, double min_directional,
-                     double min_exponent, struct rules_side *out,
-                     struct rules_folding *f);
+void bsdf_from_gltf(const struct bsdf_gltf *g, double min_directional,
+                    double min_exponent, struct bsdf_side *out,
+                    struct bsdf_folding *f);
 
 /* rho_d + tau_d + rho_s + tau_s */
-double rules_albedo(const struct rules_side *s, int band);
+double bsdf_side_albedo(const struct bsdf_side *s, int band);
 
 /* Scales a band's four coefficients to the albedo 1. */
-void rules_rescale(struct rules_side *s, int band);
+void bsdf_side_rescale(struct bsdf_side *s, int band);
 
 /* Exponents of coefficients that are 0 in all bands become INFINITY, so that
  * equal materials are equal numbers. */
-void rules_normalise(struct rules_side *s, int bands);
+void bsdf_side_normalise(struct bsdf_side *s, int bands);
 
 /* 1 if any of the bands is transmitted. */
-int rules_transmits(const struct rules_side *s, int bands);
+int bsdf_side_transmits(const struct bsdf_side *s, int bands);
 
 /* Luminance of linear RGB with the primaries of sRGB (ITU-R BT.709). */
-double rules_luminance(const double rgb[3]);
+double bsdf_luminance(const double rgb[3]);
 
 #endif

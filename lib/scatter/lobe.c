@@ -8,7 +8,7 @@
 
 static const double pi = 3.14159265358979323846;
 
-double lobe_power(double k, double cos_gamma)
+double bsdf_lobe_power(double k, double cos_gamma)
 {
 	if (!(cos_gamma > 0))
 		return 0;
@@ -44,7 +44,7 @@ static double beta_series(double p, double q, double z)
 	return sum;
 }
 
-double lobe_normaliser(double k, double cos_theta)
+double bsdf_lobe_normaliser(double k, double cos_theta)
 {
 	double whole = 2 * pi / (k + 1), a = .5 * (k + 1);
 	double y = cos_theta * cos_theta, x = 1 - y;
@@ -101,13 +101,13 @@ static double albedo_piece(double k, double c, double s, double lo, double hi)
 		double g = lo + (hi - lo) / (1 + exp(-2 * q));
 		double cosine = cos(g), sine = sin(g);
 		double jacobian = .25 * pi * cosh(t) / (cosh(q) * cosh(q));
-		sum += jacobian * (k + 1) * lobe_power(k, cosine) * sine *
+		sum += jacobian * (k + 1) * bsdf_lobe_power(k, cosine) * sine *
 		       clamped_mean(cosine * c, sine * s, c);
 	}
 	return sum * step * (hi - lo);
 }
 
-double lobe_albedo(double k, double cos_theta)
+double bsdf_lobe_albedo(double k, double cos_theta)
 {
 	double c = fmin(fmax(cos_theta, 1e-12), 1), s = sqrt(1 - c * c), theta = acos(c);
 	/* cos^(k+1) of the last angle is e^-40. */
@@ -129,7 +129,7 @@ static void in_frame(const double axis[3], double sine, double cosine, double ph
 		out[i] = sine * (x * t[i] + y * b[i]) + cosine * axis[i];
 }
 
-void lobe_sample_whole(double k, const double axis[3], const double u[2], double out[3])
+void bsdf_lobe_sample_whole(double k, const double axis[3], const double u[2], double out[3])
 {
 	/* cos^(k+1) is uniform; the sine without cancellation for large k. */
 	double l = log1p(-u[0]) / (k + 1);
@@ -137,44 +137,44 @@ void lobe_sample_whole(double k, const double axis[3], const double u[2], double
 	in_frame(axis, sqrt(-expm1(2 * l)), exp(l), 2 * pi * u[1], out);
 }
 
-void lobe_sample(double k, const double axis[3], const double n[3], const double u[2],
-                 double out[3])
+void bsdf_lobe_sample(double k, const double axis[3], const double n[3], const double u[2],
+                      double out[3])
 {
 	enum { TRIES = 64 }; /* at least half of the lobe is above the horizon */
 	uint64_t bits[2];
 	struct rng r;
 
-	lobe_sample_whole(k, axis, u, out);
+	bsdf_lobe_sample_whole(k, axis, u, out);
 	if (v3_dot(n, out) > 0)
 		return;
 	memcpy(bits, u, sizeof bits);
 	r = rng_seed(bits[0], bits[1]);
 	for (int i = 0; i < TRIES && v3_dot(n, out) <= 0; i++) {
 		double v[2] = { rng_uniform(&r), rng_uniform(&r) };
-		lobe_sample_whole(k, axis, v, out);
+		bsdf_lobe_sample_whole(k, axis, v, out);
 	}
 	if (v3_dot(n, out) <= 0) /* an axis on the horizon but for rounding */
 		v3_mad(out, -2 * v3_dot(n, out), n, out);
 }
 
-double lobe_scatter(enum lobe_kind kind, double k, const double axis[3], const double n[3],
-                    const double u[2], double out[3])
+double bsdf_lobe_scatter(enum lobe_kind kind, double k, const double axis[3], const double n[3],
+                         const double u[2], double out[3])
 {
 	if (kind == LOBE_PAPER) {
-		lobe_sample(k, axis, n, u, out);
+		bsdf_lobe_sample(k, axis, n, u, out);
 		return 1;
 	}
-	lobe_sample_whole(k, axis, u, out);
+	bsdf_lobe_sample_whole(k, axis, u, out);
 	double ci = v3_dot(axis, n), co = v3_dot(out, n);
 	return co <= 0 ? 0 : co / fmax(ci, co);
 }
 
-void lobe_sample_cosine(const double n[3], const double u[2], double out[3])
+void bsdf_sample_cosine(const double n[3], const double u[2], double out[3])
 {
 	in_frame(n, sqrt(u[0]), sqrt(1 - u[0]), 2 * pi * u[1], out);
 }
 
-void lobe_mirror(const double l[3], const double n[3], double out[3])
+void bsdf_lobe_mirror(const double l[3], const double n[3], double out[3])
 {
 	double twice = 2 * v3_dot(n, l);
 

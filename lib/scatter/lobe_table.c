@@ -7,10 +7,10 @@
 /* Wider lobes have a normaliser that is not smooth at cosine 1. */
 static const double sharp_from = 5;
 
-void lobe_table_make(struct lobe_table *t, double k)
+void bsdf_lobe_table_make(struct lobe_table *t, double k)
 {
 	t->k = k;
-	t->whole = lobe_normaliser(k, 1);
+	t->whole = bsdf_lobe_normaliser(k, 1);
 	/* The horizon cuts off cos^k of more than the angle whose sine is `end`. */
 	t->end = fmin(1, 6 / sqrt(k + 1));
 	t->per_step = LOBE_TABLE / t->end;
@@ -19,14 +19,14 @@ void lobe_table_make(struct lobe_table *t, double k)
 	for (int i = 0; i <= LOBE_TABLE + 2; i++) {
 		double c = (i - 1) / t->per_step;
 		/* What a lobe below the horizon loses, one above it has. */
-		t->value[i] = c < 0 ? t->whole - lobe_normaliser(k, -c) : lobe_normaliser(k, fmin(1, c));
+		t->value[i] = c < 0 ? t->whole - bsdf_lobe_normaliser(k, -c) : bsdf_lobe_normaliser(k, fmin(1, c));
 	}
 }
 
-double lobe_table_normaliser(const struct lobe_table *t, double cos_theta)
+double bsdf_lobe_table_normaliser(const struct lobe_table *t, double cos_theta)
 {
 	if (t->k < sharp_from)
-		return lobe_normaliser(t->k, cos_theta);
+		return bsdf_lobe_normaliser(t->k, cos_theta);
 	if (cos_theta >= t->end)
 		return t->whole;
 	double at = cos_theta * t->per_step, i = fmin(floor(at), LOBE_TABLE - 1), u = at - i;

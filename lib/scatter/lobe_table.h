@@ -11,9 +11,9 @@ struct lobe_table {
 	double value[LOBE_TABLE + 3];   /* at cosines -1 step, 0, ... end, one step beyond */
 };
 
-void lobe_table_make(struct lobe_table *t, double k);
+void bsdf_lobe_table_make(struct lobe_table *t, double k);
 
-/* lobe_normaliser(k, cos_theta), 0 <= cos_theta <= 1, to a relative error of 1e-5. */
-double lobe_table_normaliser(const struct lobe_table *t, double cos_theta);
+/* bsdf_lobe_normaliser(k, cos_theta), 0 <= cos_theta <= 1, to a relative error of 1e-5. */
+double bsdf_lobe_table_normaliser(const struct lobe_table *t, double cos_theta);
 
 #endif

@@ -19,7 +19,7 @@ static void turn(const struct facet *f, const struct mirror_plane *k, const doub
 {
 	double offset = k->offset - v3_dot(k->n, centre), lowest, highest;
 
-	facet_heights(f, k->n, offset, &lowest, &highest);
+	geo_facet_heights(f, k->n, offset, &lowest, &highest);
 	if (highest <= 1e-6 * f->radius)
 		return;
 	for (int i = 0; i < f->n; i++) { /* the other way round, so that its front sends */
@@ -28,10 +28,10 @@ static void turn(const struct facet *f, const struct mirror_plane *k, const doub
 	}
 	to->n = f->n;
 	to->v = corner;
-	facet_measure(to);
+	geo_facet_measure(to);
 }
 
-static int make_images(struct view_images *s, const struct model *m, struct err *e)
+static int make_images(struct emitter_images *s, const struct model *m, struct err *e)
 {
 	size_t emitters = s->emitters.n, used = 0;
 
@@ -66,13 +66,13 @@ static int inside(const struct facet *f, const double x[3])
 }
 
 /* The emitter that an element-side is part of. */
-static uint32_t emitter_of(const struct view_images *s, const struct model *m, size_t element, int side)
+static uint32_t emitter_of(const struct emitter_images *s, const struct model *m, size_t element, int side)
 {
-	const double *n = &m->element_normal[3 * element];
+	const double *n = &m->element.normal[3 * element];
 	double x[3] = { -s->centre[0], -s->centre[1], -s->centre[2] };
 
 	for (size_t k = 0; k < 3; k++)
-		v3_mad(x, 1. / 3, &m->vertex[3 * (size_t)m->element[3 * element + k]], x);
+		v3_mad(x, 1. / 3, &m->vertex[3 * (size_t)m->element.corner[3 * element + k]], x);
 	for (size_t i = 0; i < s->emitters.n; i++) {
 		const struct facet *f = &s->emitters.emitter[i].f;
 		if ((side == FRONT ? 1 : -1) * v3_dot(n, f->normal) > 1 - 1e-6 &&
@@ -82,20 +82,20 @@ static uint32_t emitter_of(const struct view_images *s, const struct model *m, s
 	return UINT32_MAX;
 }
 
-int view_images_init(struct view_images *s, const struct model *m, struct err *e)
+int view_emitter_images_init(struct emitter_images *s, const struct model *m, struct err *e)
 {
-	*s = (struct view_images){ .n = 0 };
-	facet_centre(m, s->centre);
-	if (emitters_init(&s->emitters, m, e) || mirrors_find(m, &s->mirrors, e))
+	*s = (struct emitter_images){ .n = 0 };
+	occ_facet_centre(m, s->centre);
+	if (occ_emitters_init(&s->emitters, m, e) || ray_mirrors_find(m, &s->mirrors, e))
 		return -1;
 	if (s->emitters.n > VIEW_EMITTERS_MOST || s->mirrors.n > VIEW_MIRRORS_MOST ||
 	    (s->mirrors.n == 0 && !bsdf_any_pane(&m->material)))
 		return 0;
-	s->of = mem_new(m->elements, 2 * sizeof *s->of, "images of emitters", e);
+	s->of = mem_new(m->element.n, 2 * sizeof *s->of, "images of emitters", e);
 	if (!s->of || make_images(s, m, e))
 		return -1;
-	for (size_t i = 0; i < 2 * m->elements; i++) {
-		uint32_t material = model_patch_material(m, m->element_patch[i / 2]);
+	for (size_t i = 0; i < 2 * m->element.n; i++) {
+		uint32_t material = model_patch_material(m, m->element.patch[i / 2]);
 		int side = (int)(i % 2);
 		s->of[i] = bsdf_emits(&m->material, material, side) ? emitter_of(s, m, i / 2, side)
 		                                                    : UINT32_MAX;
@@ -103,24 +103,24 @@ int view_images_init(struct view_images *s, const struct model *m, struct err *e
 	return 0;
 }
 
-void view_images_free(struct view_images *s)
+void view_emitter_images_free(struct emitter_images *s)
 {
-	emitters_free(&s->emitters);
-	mirrors_free(&s->mirrors);
+	occ_emitters_free(&s->emitters);
+	ray_mirrors_free(&s->mirrors);
 	free(s->image);
 	free(s->corner);
 	free(s->of);
 }
 
-int view_images_plane(const struct view_images *s, uint32_t material, int side, const double n[3],
-                      const double x[3])
+int view_emitter_images_plane(const struct emitter_images *s, uint32_t material, int side, const double n[3],
+                              const double x[3])
 {
 	double out[3];
 
 	for (int k = 0; k < 3; k++)
 		out[k] = side == FRONT ? n[k] : -n[k];
 	for (size_t i = 0; i < s->mirrors.n; i++)
-		if (mirror_has(&s->mirrors, &s->mirrors.plane[i], material, side, out, x))
+		if (ray_mirror_has(&s->mirrors, &s->mirrors.plane[i], material, side, out, x))
 			return (int)i;
 	return -1;
 }
@@ -129,7 +129,7 @@ int view_images_plane(const struct view_images *s, uint32_t material, int side, 
 
 /* About the radiance that a lobe makes of an image, if nothing is in the way: that of where
  * the image is closest to the axis. Never 0 where the lobe has anything to speak of. */
-static double guess(const struct view_images *s, size_t i, const struct view_lobe_seen *l,
+static double guess(const struct emitter_images *s, size_t i, const struct view_lobe_seen *l,
                     const double x[3])
 {
 	const struct facet *f = &s->image[i];
@@ -146,12 +146,12 @@ static double guess(const struct view_images *s, size_t i, const struct view_lob
 	if (v3_dot(l->normal, d) + f->radius <= 0)
 		return 0;
 	double off = acos(fmax(-1, fmin(1, v3_dot(l->axis, d) / sqrt(r2)))) - asin(fmin(1, f->radius / r));
-	double power = lobe_power(l->k, cos(fmax(0, off))), part = (l->k + 1) * fmin(t->f.area / near, 1);
+	double power = bsdf_lobe_power(l->k, cos(fmax(0, off))), part = (l->k + 1) * fmin(t->f.area / near, 1);
 	return t->power / t->f.area * fmin(1, there / r) * fmin(part, 1) * power;
 }
 
-void view_aim_begin(const struct view_images *s, const struct view_lobe_seen *l, double enough,
-                    struct view_aim *a)
+void view_emitter_images_choose(const struct emitter_images *s, const struct view_lobe_seen *l, double enough,
+                                struct view_aim *a)
 {
 	a->sum = 0;
 	v3_sub(l->x, s->centre, a->x);
@@ -169,14 +169,14 @@ void view_aim_begin(const struct view_images *s, const struct view_lobe_seen *l,
 		a->sum = 0;
 }
 
-double view_aim_density(const struct view_images *s, const struct view_aim *a, size_t image,
-                        double way, double cosine)
+double view_emitter_images_density(const struct emitter_images *s, const struct view_aim *a, size_t image,
+                                   double way, double cosine)
 {
 	return a->guess[image] / a->sum * way * way / (fmax(cosine, 1e-9) * s->image[image].area);
 }
 
-double view_aim_at(const struct view_images *s, const struct view_aim *a, const double u[3],
-                   double dir[3], uint32_t *image)
+double view_emitter_images_aim(const struct emitter_images *s, const struct view_aim *a, const double u[3],
+                               double dir[3], uint32_t *image)
 {
 	double at = u[0] * a->sum, y[3];
 	size_t i = 0, last = 0;
@@ -190,8 +190,8 @@ double view_aim_at(const struct view_images *s, const struct view_aim *a, const 
 		at -= a->guess[i];
 	}
 	*image = (uint32_t)last;
-	facet_point(&s->image[last], u[1], u[2], y);
+	geo_facet_point(&s->image[last], u[1], u[2], y);
 	v3_sub(y, a->x, dir);
 	double way = v3_normalise(dir), cosine = -v3_dot(dir, s->image[last].normal);
-	return cosine > 0 ? view_aim_density(s, a, last, way, cosine) : 0;
+	return cosine > 0 ? view_emitter_images_density(s, a, last, way, cosine) : 0;
 }

@@ -20,9 +20,9 @@ enum {
 
 /* Image t of emitter i in mirror k is number (k + 1) emitters + i; k = -1 are the emitters
  * themselves, behind panes. */
-struct view_images {
+struct emitter_images {
 	size_t n;                   /* 0: nothing to aim at, or too much */
-	struct facet *image;        /* [n] corners relative to facet_centre(); n = 0: none */
+	struct facet *image;        /* [n] corners relative to occ_facet_centre(); n = 0: none */
 	double *corner;
 	struct emitters emitters;
 	struct mirrors mirrors;
@@ -32,8 +32,8 @@ struct view_images {
 
 /* Needs derived lights. O(triangles + elements emitters + images). 0, or -1 and e; to be
  * freed in any case. */
-int view_images_init(struct view_images *s, const struct model *m, struct err *e);
-void view_images_free(struct view_images *s);
+int view_emitter_images_init(struct emitter_images *s, const struct model *m, struct err *e);
+void view_emitter_images_free(struct emitter_images *s);
 
 /* How samples of a lobe are aimed. */
 struct view_aim {
@@ -43,21 +43,21 @@ struct view_aim {
 };
 
 /* O(images). `enough`: radiance that is worth aiming at. */
-void view_aim_begin(const struct view_images *s, const struct view_lobe_seen *l, double enough,
-                    struct view_aim *a);
+void view_emitter_images_choose(const struct emitter_images *s, const struct view_lobe_seen *l, double enough,
+                                struct view_aim *a);
 
 /* A direction towards a point of some image, from three numbers in [0,1): its density, and
  * the image. 0 if it is edge on. */
-double view_aim_at(const struct view_images *s, const struct view_aim *a, const double u[3],
-                   double dir[3], uint32_t *image);
+double view_emitter_images_aim(const struct emitter_images *s, const struct view_aim *a, const double u[3],
+                               double dir[3], uint32_t *image);
 
-/* The density with which view_aim_at finds a point of an image at a distance, which is seen at
+/* The density with which view_emitter_images_aim finds a point of an image at a distance, which is seen at
  * an angle of this cosine. */
-double view_aim_density(const struct view_images *s, const struct view_aim *a, size_t image,
-                        double way, double cosine);
+double view_emitter_images_density(const struct emitter_images *s, const struct view_aim *a, size_t image,
+                                   double way, double cosine);
 
 /* The mirror plane that a point of a side with front normal n is on, or -1. */
-int view_images_plane(const struct view_images *s, uint32_t material, int side, const double n[3],
-                      const double x[3]);
+int view_emitter_images_plane(const struct emitter_images *s, uint32_t material, int side, const double n[3],
+                              const double x[3]);
 
 #endif

@@ -30,7 +30,7 @@ struct gather {
 	const struct view_scene *v;
 	struct gather_options o;
 	struct smooth_groups groups;
-	struct edges edges;
+	struct half_edges edges;
 	unsigned char *wanted;  /* [groups][2] */
 	unsigned char *asked;   /* [2 elements] */
 	float *value, *error;   /* [elements][3 corners][2][bands] irradiance, standard error, and */
@@ -44,7 +44,7 @@ struct gather {
 
 static int new_arrays(struct gather *g, struct err *e)
 {
-	size_t n = g->v->m->elements, bands = (size_t)g->v->m->bands;
+	size_t n = g->v->m->element.n, bands = (size_t)g->v->m->bands;
 
 	g->wanted = mem_new(g->groups.groups, 2, "gathering", e);
 	g->asked = mem_new(n, 2, "gathering", e);
@@ -56,13 +56,13 @@ static int new_arrays(struct gather *g, struct err *e)
 	if (!g->wanted || !g->asked || !g->value || !g->error || !g->common || !g->miss || !g->worker)
 		return -1;
 	for (int t = 0; t < g->o.threads; t++)
-		if (gather_worker_init(&g->worker[t], &g->table, g->v, g->o.depth, e))
+		if (view_gather_worker_init(&g->worker[t], &g->table, g->v, g->o.depth, e))
 			return -1;
 	return 0;
 }
 
-struct gather *gather_new(const struct view_scene *v, const struct gather_options *o,
-                          struct err *e)
+struct gather *view_gather_new(const struct view_scene *v, const struct gather_options *o,
+                               struct err *e)
 {
 	const struct model *m = v->m;
 	struct gather *g = mem_new(1, sizeof *g, "gathering", e);
@@ -71,23 +71,23 @@ struct gather *gather_new(const struct view_scene *v, const struct gather_option
 		return NULL;
 	g->v = v;
 	g->o = *o;
-	if (!gather_table_init(&g->table, v, v->s, o->threads, e) &&
-	    !smooth_groups_new(m, COS_CREASE, &g->groups, e) &&
-	    !edges_build(&g->edges, m->element, m->elements, m->vertices, e) && !new_arrays(g, e))
+	if (!view_gather_table_init(&g->table, v, v->s, o->threads, e) &&
+	    !interp_smooth_groups_new(m, COS_CREASE, &g->groups, e) &&
+	    !geo_half_edges_build(&g->edges, m->element.corner, m->element.n, m->vertices, e) && !new_arrays(g, e))
 		return g;
-	gather_free(g);
+	view_gather_free(g);
 	return NULL;
 }
 
-void gather_free(struct gather *g)
+void view_gather_free(struct gather *g)
 {
 	if (!g)
 		return;
 	for (int t = 0; t < g->o.threads && g->worker; t++)
-		gather_worker_free(&g->worker[t]);
-	gather_table_free(&g->table);
-	smooth_groups_free(&g->groups);
-	edges_free(&g->edges);
+		view_gather_worker_free(&g->worker[t]);
+	view_gather_table_free(&g->table);
+	interp_smooth_groups_free(&g->groups);
+	geo_half_edges_free(&g->edges);
 	free(g->worker);
 	free(g->wanted);
 	free(g->asked);
@@ -98,7 +98,7 @@ void gather_free(struct gather *g)
 	free(g);
 }
 
-int gather_check(const struct gather *g, struct err *e)
+int view_gather_check(const struct gather *g, struct err *e)
 {
 	for (int t = 0; t < g->o.threads; t++)
 		if (g->worker[t].e.set)
@@ -106,7 +106,7 @@ int gather_check(const struct gather *g, struct err *e)
 	return 0;
 }
 
-uint64_t gather_rays(const struct gather *g)
+uint64_t view_gather_rays(const struct gather *g)
 {
 	uint64_t sum = 0;
 
@@ -115,7 +115,7 @@ uint64_t gather_rays(const struct gather *g)
 	return sum;
 }
 
-void gather_want(struct gather *g, uint32_t element_side)
+void view_gather_want(struct gather *g, uint32_t element_side)
 {
 	for (uint32_t k = 0; k < 3; k++) {
 		size_t group = g->groups.group[3 * (element_side >> 1) + k];
@@ -142,17 +142,17 @@ static void centroid(const struct model *m, uint32_t element, double x[3])
 {
 	memset(x, 0, 3 * sizeof *x);
 	for (int k = 0; k < 3; k++)
-		v3_mad(x, 1. / 3, &m->vertex[3 * (size_t)m->element[3 * (size_t)element + (size_t)k]], x);
+		v3_mad(x, 1. / 3, &m->vertex[3 * (size_t)m->element.corner[3 * (size_t)element + (size_t)k]], x);
 }
 
 /* How far towards the middle it goes: where elements bend, no further than needed. */
 static double inwards(const struct model *m, const uint32_t *corner, const uint32_t *of, uint32_t n,
                       uint32_t cluster)
 {
-	const double *first = &m->element_normal[3 * (size_t)(corner[cluster] / 3)];
+	const double *first = &m->element.normal[3 * (size_t)(corner[cluster] / 3)];
 
 	for (uint32_t i = 0; i < n; i++)
-		if (of[i] == cluster && v3_dot(first, &m->element_normal[3 * (size_t)(corner[i] / 3)]) < 1 - 1e-6)
+		if (of[i] == cluster && v3_dot(first, &m->element.normal[3 * (size_t)(corner[i] / 3)]) < 1 - 1e-6)
 			return 1e-3;
 	return towards_middle;
 }
@@ -162,20 +162,20 @@ static void find_point(const struct gather *g, const uint32_t *corner, const uin
 {
 	const struct model *m = g->v->m;
 	const struct reconstruction *all = &g->v->all, *indirect = &g->table.indirect;
-	const double *vertex = &m->vertex[3 * (size_t)m->element[corner[0]]];
+	const double *vertex = &m->vertex[3 * (size_t)m->element.corner[corner[0]]];
 	double middle[3] = { 0 }, c[3], area = 0, step = inwards(m, corner, of, n, cluster);
 	size_t bands = (size_t)m->bands;
 
 	*p = (struct corner_point){ 0 };
 	for (uint32_t i = 0; i < n; i++) {
 		uint32_t e = corner[i] / 3;
-		double a = m->element_area[e];
+		double a = m->element.area[e];
 		if (of[i] != cluster)
 			continue;
 		centroid(m, e, c);
 		v3_sub(c, vertex, c);
 		v3_mad(middle, a, c, middle);
-		v3_mad(p->n, side ? -a : a, &m->element_normal[3 * (size_t)e], p->n);
+		v3_mad(p->n, side ? -a : a, &m->element.normal[3 * (size_t)e], p->n);
 		area += a;
 		for (size_t b = 0; b < bands; b++) {
 			size_t at = (2 * (size_t)corner[i] + (size_t)side) * bands + b, mean[3];
@@ -203,8 +203,8 @@ static void find_point(const struct gather *g, const uint32_t *corner, const uin
 static void near_corner(const struct gather *g, uint32_t corner, int side, double x[3])
 {
 	const struct model *m = g->v->m;
-	const double *vertex = &m->vertex[3 * (size_t)m->element[corner]];
-	const double *n = &m->element_normal[3 * (size_t)(corner / 3)];
+	const double *vertex = &m->vertex[3 * (size_t)m->element.corner[corner]];
+	const double *n = &m->element.normal[3 * (size_t)(corner / 3)];
 	double c[3];
 
 	centroid(m, corner / 3, c);
@@ -216,7 +216,7 @@ static void near_corner(const struct gather *g, uint32_t corner, int side, doubl
 /* Do the elements of two corners at one vertex share an edge there? */
 static int neighbours(const struct model *m, uint32_t a, uint32_t b)
 {
-	const uint32_t *p = &m->element[a - a % 3], *q = &m->element[b - b % 3];
+	const uint32_t *p = &m->element.corner[a - a % 3], *q = &m->element.corner[b - b % 3];
 
 	return p[(a + 1) % 3] == q[(b + 2) % 3] || p[(a + 2) % 3] == q[(b + 1) % 3];
 }
@@ -232,15 +232,15 @@ static void part_corners(const struct gather *g, const uint32_t *corner, uint32_
 		of[i] = i;
 	for (uint32_t i = 0; i < n; i++)
 		for (uint32_t j = i + 1; j < n; j++) {
-			if (sets_find(of, i) == sets_find(of, j) || !neighbours(g->v->m, corner[i], corner[j]))
+			if (geo_sets_find(of, i) == geo_sets_find(of, j) || !neighbours(g->v->m, corner[i], corner[j]))
 				continue;
 			near_corner(g, corner[i], side, a);
 			near_corner(g, corner[j], side, b);
 			if (!ray_blocked(g->v->rays, a, b))
-				sets_join(of, i, j);
+				geo_sets_join(of, i, j);
 		}
 	for (uint32_t i = 0; i < n; i++)
-		of[i] = sets_find(of, i);
+		of[i] = geo_sets_find(of, i);
 }
 
 static void gather_group(struct gather *g, struct gather_worker *w, size_t group, int side)
@@ -258,8 +258,8 @@ static void gather_group(struct gather *g, struct gather_worker *w, size_t group
 			if (of[c] != c)
 				continue;
 			find_point(g, corner + from, of, some, c, side, &p);
-			gather_point(w, p.x, p.n, rng_mix(2 * corner[from + c] + (uint32_t)side), g->o.rays,
-			             g->o.relative, p.h, &found);
+			view_gather_point(w, p.x, p.n, rng_mix(2 * corner[from + c] + (uint32_t)side), g->o.rays,
+			                  g->o.relative, p.h, &found);
 			for (uint32_t i = c; i < some; i++)
 				for (size_t b = 0; b < bands && of[i] == c; b++) {
 					size_t at = (2 * (size_t)corner[from + i] + (size_t)side) * bands + b;
@@ -293,8 +293,8 @@ static double difference(const struct gather *g, uint32_t h, uint32_t other, siz
 	size_t row = 2 * (size_t)m->bands;
 	uint32_t a = h, b = h % 3 == 2 ? h - 2 : h + 1, c = h % 3 == 0 ? h + 2 : h - 1;
 	uint32_t oa = other % 3 == 2 ? other - 2 : other + 1, od = other % 3 == 0 ? other + 2 : other - 1;
-	const double *x[4] = { &m->vertex[3 * (size_t)m->element[a]], &m->vertex[3 * (size_t)m->element[b]],
-		&m->vertex[3 * (size_t)m->element[c]], &m->vertex[3 * (size_t)m->element[od]] };
+	const double *x[4] = { &m->vertex[3 * (size_t)m->element.corner[a]], &m->vertex[3 * (size_t)m->element.corner[b]],
+		&m->vertex[3 * (size_t)m->element.corner[c]], &m->vertex[3 * (size_t)m->element.corner[od]] };
 	double va = (double)g->value[a * row + channel], vb = (double)g->value[b * row + channel];
 	double w[3], whole[3], part[3], noise = 0;
 
@@ -339,23 +339,23 @@ static void find_misses(void *arg, size_t begin, size_t end, int thread)
 		}
 }
 
-void gather_corners(struct gather *g, const struct progress *progress)
+void view_gather_corners(struct gather *g, const struct progress *progress)
 {
 	par_for(2 * g->groups.groups, 16, g->o.threads, gather_groups, g, progress);
-	par_for(2 * g->v->m->elements, 1024, g->o.threads, find_misses, g, NULL);
+	par_for(2 * g->v->m->element.n, 1024, g->o.threads, find_misses, g, NULL);
 }
 
 /* ---- points ---- */
 
-void gather_at(struct gather *g, uint32_t element_side, const double x[3], const double w[3],
-               uint64_t seed, int thread, struct gathered *to)
+void view_gather_at(struct gather *g, uint32_t element_side, const double x[3], const double w[3],
+                    uint64_t seed, int thread, struct gathered *to)
 {
 	size_t bands = (size_t)g->v->m->bands, element = element_side >> 1, side = element_side & 1;
 	double all[BANDS_MAX], wanted = g->o.relative > 0 ? g->o.relative : usual_miss;
 	int good = 1;
 
 	*to = (struct gathered){ 0 };
-	reconstruction_at(&g->v->all, element, (int)side, w, all);
+	interp_reconstruction_at(&g->v->all, element, (int)side, w, all);
 	for (size_t b = 0; b < bands; b++) {
 		double miss = (double)g->miss[element_side * bands + b], square = miss * miss, common = 0;
 		for (size_t k = 0; k < 3; k++) {
@@ -373,10 +373,10 @@ void gather_at(struct gather *g, uint32_t element_side, const double x[3], const
 		return;
 	struct corner_point p;
 	for (int k = 0; k < 3; k++)
-		p.n[k] = (side ? -1 : 1) * g->v->m->element_normal[3 * element + (size_t)k];
+		p.n[k] = (side ? -1 : 1) * g->v->m->element.normal[3 * element + (size_t)k];
 	memcpy(p.x, x, sizeof p.x);
 	ray_leave(g->v->rays, p.n, p.x);
 	int rays = g->o.rays / g->o.samples > FEWEST ? g->o.rays / g->o.samples : FEWEST;
-	gather_point(&g->worker[thread], p.x, p.n, rng_mix(seed), rays,
-	             g->o.relative * sqrt(g->o.samples), all, to);
+	view_gather_point(&g->worker[thread], p.x, p.n, rng_mix(seed), rays,
+	                  g->o.relative * sqrt(g->o.samples), all, to);
 }

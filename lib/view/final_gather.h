@@ -29,16 +29,16 @@ struct gather_options {
 };
 
 /* v, made for VIEW_GATHER, must outlive it. O(elements). NULL and e on failure. */
-struct gather *gather_new(const struct view_scene *v, const struct gather_options *o,
-                          struct err *e);
-void gather_free(struct gather *g);
+struct gather *view_gather_new(const struct view_scene *v, const struct gather_options *o,
+                               struct err *e);
+void view_gather_free(struct gather *g);
 
 /* Asks for the light on a side of an element; from any thread. */
-void gather_want(struct gather *g, uint32_t element_side);
+void view_gather_want(struct gather *g, uint32_t element_side);
 
 /* Gathers at the corners of all that is wanted. The result depends on what was wanted, but
  * not on the number of threads. O(corners x rays x log triangles). */
-void gather_corners(struct gather *g, const struct progress *progress);
+void view_gather_corners(struct gather *g, const struct progress *progress);
 
 /* Irradiance at a point and its standard error: of this point alone, and what it has in
  * common with points around, of interpolation and of the errors of the solution where rays
@@ -49,13 +49,13 @@ struct gathered {
 
 /* Indirect irradiance at point x (world) of a side that was wanted, whose element's corners
  * have weights w there. */
-void gather_at(struct gather *g, uint32_t element_side, const double x[3], const double w[3],
-               uint64_t seed, int thread, struct gathered *to);
+void view_gather_at(struct gather *g, uint32_t element_side, const double x[3], const double w[3],
+                    uint64_t seed, int thread, struct gathered *to);
 
 /* 0, or -1 and e if memory was short. */
-int gather_check(const struct gather *g, struct err *e);
+int view_gather_check(const struct gather *g, struct err *e);
 
 /* Rays traced so far. */
-uint64_t gather_rays(const struct gather *g);
+uint64_t view_gather_rays(const struct gather *g);
 
 #endif

@@ -34,7 +34,7 @@ static const double rough_from = .02;
 /* Weights of corners 1 and 2 of an element's triangle at a vertex. */
 static void weights(const struct model *m, uint32_t triangle, const double *x, double w[2])
 {
-	const uint32_t *c = &m->triangle[3 * (size_t)triangle];
+	const uint32_t *c = &m->triangle.corner[3 * (size_t)triangle];
 	const double *a = &m->vertex[3 * (size_t)c[0]], *b = &m->vertex[3 * (size_t)c[1]],
 	             *d = &m->vertex[3 * (size_t)c[2]];
 	double whole[3], part[3];
@@ -54,7 +54,7 @@ static double shown(const struct view_scene *v, const struct reconstruction *r, 
 	size_t bands = (size_t)v->m->bands;
 	const struct model *m = v->m;
 	const struct view_side *s =
-		&v->side[2 * model_patch_material(m, m->element_patch[corner / 3]) + (uint32_t)side];
+		&v->side[2 * model_patch_material(m, m->element.patch[corner / 3]) + (uint32_t)side];
 	const float *h = r->corner + 2 * bands * corner;
 
 	return s->black ? 0 : s->here[b] * (double)h[(size_t)side * bands + b] +
@@ -69,7 +69,7 @@ struct linear {
 static void find_linear(const struct model *m, size_t e, struct linear *l)
 {
 	for (size_t k = 0; k < 3; k++)
-		weights(m, m->element_triangle[e], &m->vertex[3 * (size_t)m->element[3 * e + k]], l->w[k]);
+		weights(m, m->element.triangle[e], &m->vertex[3 * (size_t)m->element.corner[3 * e + k]], l->w[k]);
 	l->det = (l->w[1][0] - l->w[0][0]) * (l->w[2][1] - l->w[0][1]) -
 	         (l->w[1][1] - l->w[0][1]) * (l->w[2][0] - l->w[0][0]);
 }
@@ -105,8 +105,8 @@ static void fill_element(const struct view_scene *v, const struct reconstruction
 /* Is what interpolation misses of a side's light worth computing? */
 static int rough(const struct solution *s, size_t element_side)
 {
-	for (int b = 0; b < s->bands && s->discretisation; b++)
-		if (s->discretisation[element_side * (size_t)s->bands + (size_t)b] >
+	for (int b = 0; b < s->bands && s->error.discretisation; b++)
+		if (s->error.discretisation[element_side * (size_t)s->bands + (size_t)b] >
 		    rough_from * solution_irradiance(s, element_side, b))
 			return 1;
 	return 0;
@@ -116,39 +116,39 @@ static void find_kinds(struct gather_table *t, const struct solution *s)
 {
 	const struct model *m = t->v->m;
 
-	for (size_t i = 0; i < 2 * m->elements; i++) {
+	for (size_t i = 0; i < 2 * m->element.n; i++) {
 		const struct view_side *side =
-			&t->v->side[2 * model_patch_material(m, m->element_patch[i / 2]) + i % 2];
+			&t->v->side[2 * model_patch_material(m, m->element.patch[i / 2]) + i % 2];
 		if (side->black)
 			continue;
 		if (side->reflected.coefficient || side->transmitted.coefficient)
 			t->kind[i] |= GATHER_TAIL;
-		if (direct_exact(t->v->direct) &&
+		if (occ_direct_exact(t->v->direct) &&
 		    ((side->diffuse && rough(s, i)) || (side->translucent && rough(s, i ^ 1))))
 			t->kind[i] |= GATHER_ROUGH;
 	}
 }
 
-int gather_table_init(struct gather_table *t, const struct view_scene *v, const struct solution *s,
-                      int threads, struct err *e)
+int view_gather_table_init(struct gather_table *t, const struct view_scene *v, const struct solution *s,
+                           int threads, struct err *e)
 {
 	const struct model *m = v->m;
 	struct reconstruction rest = { 0 };
 
 	*t = (struct gather_table){ .v = v };
-	t->radiance = mem_new(6 * m->elements, (size_t)m->bands * sizeof *t->radiance, "gathering", e);
-	t->rest = mem_new(6 * m->elements, (size_t)m->bands * sizeof *t->rest, "gathering", e);
-	t->kind = mem_new(m->elements, 2, "gathering", e);
+	t->radiance = mem_new(6 * m->element.n, (size_t)m->bands * sizeof *t->radiance, "gathering", e);
+	t->rest = mem_new(6 * m->element.n, (size_t)m->bands * sizeof *t->rest, "gathering", e);
+	t->kind = mem_new(m->element.n, 2, "gathering", e);
 	t->bits = mem_new(2 * GATHER_BITS, sizeof *t->bits, "gathering", e);
-	if (!t->radiance || !t->rest || !t->kind || !t->bits || locator_init(&t->locator, m, e) ||
-	    reconstruct(m, s, PART_CAUSTIC | PART_INDIRECT, threads, &rest, e) ||
-	    reconstruct(m, s, PART_INDIRECT, threads, &t->indirect, e))
+	if (!t->radiance || !t->rest || !t->kind || !t->bits || ray_locator_init(&t->locator, m, e) ||
+	    interp_reconstruct(m, s, PART_CAUSTIC | PART_INDIRECT, threads, &rest, e) ||
+	    interp_reconstruct(m, s, PART_INDIRECT, threads, &t->indirect, e))
 		return -1;
-	for (size_t i = 0; i < m->elements; i++) {
+	for (size_t i = 0; i < m->element.n; i++) {
 		fill_element(v, &v->all, i, t->radiance);
 		fill_element(v, &rest, i, t->rest);
 	}
-	reconstruction_free(&rest);
+	interp_reconstruction_free(&rest);
 	find_kinds(t, s);
 	for (uint32_t i = 0; i < GATHER_BITS; i++)
 		for (int k = 0; k < 2; k++)
@@ -156,31 +156,31 @@ int gather_table_init(struct gather_table *t, const struct view_scene *v, const 
 	return 0;
 }
 
-void gather_table_free(struct gather_table *t)
+void view_gather_table_free(struct gather_table *t)
 {
 	free(t->radiance);
 	free(t->rest);
 	free(t->kind);
-	reconstruction_free(&t->indirect);
+	interp_reconstruction_free(&t->indirect);
 	free(t->bits);
 	if (t->v)
-		locator_free(&t->locator);
+		ray_locator_free(&t->locator);
 }
 
-int gather_worker_init(struct gather_worker *w, const struct gather_table *t,
-                       const struct view_scene *v, int depth, struct err *e)
+int view_gather_worker_init(struct gather_worker *w, const struct gather_table *t,
+                            const struct view_scene *v, int depth, struct err *e)
 {
 	*w = (struct gather_worker){ .t = t };
 	w->tails = mem_new(1, sizeof *w->tails, "gathering", e);
-	w->direct = direct_worker_new(v->direct, e);
+	w->direct = occ_direct_worker_new(v->direct, e);
 	if (w->tails)
 		w->tails->depth = depth;
 	return w->tails && w->direct ? 0 : -1;
 }
 
-void gather_worker_free(struct gather_worker *w)
+void view_gather_worker_free(struct gather_worker *w)
 {
-	direct_worker_free(w->direct);
+	occ_direct_worker_free(w->direct);
 	free(w->tails);
 }
 
@@ -246,20 +246,20 @@ static void aim(double frame[3][3], const float *u0, const float *u1, struct ray
 	}
 }
 
-void gather_places(const struct gather_table *t, const struct ray_batch *b, uint32_t n,
-                   uint32_t place[RAY_BATCH])
+void view_gather_places(const struct gather_table *t, const struct ray_batch *b, uint32_t n,
+                        uint32_t place[RAY_BATCH])
 {
 	/* Many loads from all over the tables at a time take little longer than one. */
 	for (uint32_t i = 0; i < n; i++)
 		if (b->triangle[i] != RAY_MISS) {
-			place[i] = 2 * locate(&t->locator, b->triangle[i], b->w[0][i], b->w[1][i]) + b->side[i];
+			place[i] = 2 * ray_locate(&t->locator, b->triangle[i], b->w[0][i], b->w[1][i]) + b->side[i];
 			__builtin_prefetch(&t->radiance[3 * (size_t)t->v->m->bands * place[i]]);
 			__builtin_prefetch(&t->kind[place[i]]);
 		}
 }
 
-void gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_t i, uint32_t place,
-                const double *weight, double *sum)
+void view_gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_t i, uint32_t place,
+                     const double *weight, double *sum)
 {
 	size_t bands = (size_t)t->v->m->bands;
 	const float *c = t->radiance + 3 * bands * place;
@@ -273,7 +273,7 @@ void gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_
 
 static void hit_point(const struct model *m, uint32_t triangle, double p, double q, double x[3])
 {
-	const uint32_t *c = &m->triangle[3 * (size_t)triangle];
+	const uint32_t *c = &m->triangle.corner[3 * (size_t)triangle];
 
 	for (size_t k = 0; k < 3; k++)
 		x[k] = (1 - p - q) * m->vertex[3 * (size_t)c[0] + k] +
@@ -301,7 +301,7 @@ static void add_close(struct gather_worker *w, const struct gather_close *p)
 	const struct view_scene *v = w->t->v;
 	size_t bands = (size_t)v->m->bands;
 	const struct view_side *s =
-		&v->side[2 * model_patch_material(v->m, v->m->element_patch[p->place / 2]) + p->place % 2];
+		&v->side[2 * model_patch_material(v->m, v->m->element.patch[p->place / 2]) + p->place % 2];
 	const float *rest = w->t->rest + 3 * bands * p->place;
 	double h[BANDS_MAX], error[BANDS_MAX], usual[BANDS_MAX];
 
@@ -313,9 +313,9 @@ static void add_close(struct gather_worker *w, const struct gather_close *p)
 		int side = (int)(p->place % 2) ^ across;
 		if (!(across ? s->translucent : s->diffuse))
 			continue;
-		direct_begin(w->direct, (uint32_t)(p->place / 2 * 2) + (uint32_t)side);
-		reconstruction_at(&v->all, p->place / 2, side, middle, usual);
-		if (direct_at(w->direct, p->x, p->place, ROUGHLY, usual, h, error, &w->e))
+		occ_direct_begin(w->direct, (uint32_t)(p->place / 2 * 2) + (uint32_t)side);
+		interp_reconstruction_at(&v->all, p->place / 2, side, middle, usual);
+		if (occ_direct_at(w->direct, p->x, p->place, ROUGHLY, usual, h, error, &w->e))
 			return;
 		for (size_t b = 0; b < bands; b++)
 			p->sum[b] += part[b] * h[b];
@@ -345,9 +345,9 @@ static void add_blur(struct gather_worker *w, const double d[3], uint32_t place,
 	const struct view_scene *v = w->t->v;
 	const struct model *m = v->m;
 	size_t bands = (size_t)m->bands, e = place / 2;
-	const struct view_side *s = &v->side[2 * model_patch_material(m, m->element_patch[e]) + place % 2];
+	const struct view_side *s = &v->side[2 * model_patch_material(m, m->element.patch[e]) + place % 2];
 	double square = v3_dot(d, d);
-	double part = fabs(v3_dot(d, w->normal) * v3_dot(d, &m->element_normal[3 * e])) * m->element_area[e] /
+	double part = fabs(v3_dot(d, w->normal) * v3_dot(d, &m->element.normal[3 * e])) * m->element.area[e] /
 	              (pi * square * square);
 
 	for (size_t k = 0; k < bands; k++)
@@ -367,16 +367,16 @@ static void go_on(struct gather_worker *w, const double x[3], const struct ray_b
 	if (close || i % ERRORS == 0) {
 		hit_point(t->v->m, b->triangle[i], (double)b->w[0][i], (double)b->w[1][i], y);
 		v3_sub(y, x, d);
-		close = close && v3_dot(d, d) < CLOSE * CLOSE * t->v->m->element_area[place / 2];
+		close = close && v3_dot(d, d) < CLOSE * CLOSE * t->v->m->element.area[place / 2];
 	}
 	if (i % ERRORS == 0)
 		add_blur(w, d, place, close);
 	if (tail)
-		gather_go_on(w->tails, t, b, i, place, begun);
+		view_gather_go_on(w->tails, t, b, i, place, begun);
 	if (close)
 		put_close(w, b, i, place, y, sum);
 	else
-		gather_add(t, b, i, place, begun->weight, sum);
+		view_gather_add(t, b, i, place, begun->weight, sum);
 }
 
 /* Adds the radiance that the rays of a batch find. */
@@ -393,7 +393,7 @@ static void add_batch(struct gather_worker *w, const double x[3], struct ray_bat
 	if (w->closes + n > GATHER_CLOSES)
 		add_closes(w);
 	ray_nearest_batch(t->v->rays, b, n);
-	gather_places(t, b, n, place);
+	view_gather_places(t, b, n, place);
 	w->rays += n;
 	for (uint32_t i = 0; i < n; i++) {
 		w->blurs += i % ERRORS == 0;
@@ -402,7 +402,7 @@ static void add_batch(struct gather_worker *w, const double x[3], struct ray_bat
 		begun.random = rng_seed(seed, i);
 		go_on(w, x, b, i, place[i], &begun, sum);
 	}
-	gather_follow(w->tails, t, RAY_BATCH - 1, sum);
+	view_gather_follow(w->tails, t, RAY_BATCH - 1, sum);
 }
 
 /* Adds the radiance that points [first, first + n) of a scramble find. */
@@ -426,7 +426,7 @@ static void add_rays(struct gather_worker *w, const double x[3], double frame[3]
 			          rng_mix(seed + first + at + i), sum);
 		}
 	}
-	gather_follow(w->tails, w->t, 0, sum);
+	view_gather_follow(w->tails, w->t, 0, sum);
 }
 
 /* Irradiance from the sums of parts of `rays` rays each, and its standard error. 1 if that
@@ -449,8 +449,8 @@ static int settled(double part[PARTS][BANDS_MAX], int bands, double rays, double
 	return good;
 }
 
-void gather_point(struct gather_worker *w, const double x[3], const double n[3], uint64_t seed,
-                  int rays, double relative, const double *scale, struct gathered *to)
+void view_gather_point(struct gather_worker *w, const double x[3], const double n[3], uint64_t seed,
+                       int rays, double relative, const double *scale, struct gathered *to)
 {
 	double part[PARTS][BANDS_MAX] = { { 0 } }, frame[3][3];
 	int bands = w->t->v->m->bands;

@@ -48,26 +48,26 @@ struct gather_worker {
 };
 
 /* v must outlive it. 0, or -1 and e; to be freed in any case. O(elements). */
-int gather_table_init(struct gather_table *t, const struct view_scene *v, const struct solution *s,
-                      int threads, struct err *e);
-void gather_table_free(struct gather_table *t);
+int view_gather_table_init(struct gather_table *t, const struct view_scene *v, const struct solution *s,
+                           int threads, struct err *e);
+void view_gather_table_free(struct gather_table *t);
 
-int gather_worker_init(struct gather_worker *w, const struct gather_table *t,
-                       const struct view_scene *v, int depth, struct err *e);
-void gather_worker_free(struct gather_worker *w);
+int view_gather_worker_init(struct gather_worker *w, const struct gather_table *t,
+                            const struct view_scene *v, int depth, struct err *e);
+void view_gather_worker_free(struct gather_worker *w);
 
 /* The element-sides that the first n rays of a batch met, those of misses apart. */
-void gather_places(const struct gather_table *t, const struct ray_batch *b, uint32_t n,
-                   uint32_t place[RAY_BATCH]);
+void view_gather_places(const struct gather_table *t, const struct ray_batch *b, uint32_t n,
+                        uint32_t place[RAY_BATCH]);
 
 /* Adds weight[bands] times the radiance M / pi of what ray i of a batch met. */
-void gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_t i, uint32_t place,
-                const double *weight, double *sum);
+void view_gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_t i, uint32_t place,
+                     const double *weight, double *sum);
 
 /* Indirect irradiance at a point that has left its surface, whose side has unit normal n:
  * pi times the mean radiance of `rays` rays by the cosine; with relative > 0 as many as it
  * takes for a standard error of that times scale[bands]. */
-void gather_point(struct gather_worker *w, const double x[3], const double n[3], uint64_t seed,
-                  int rays, double relative, const double *scale, struct gathered *to);
+void view_gather_point(struct gather_worker *w, const double x[3], const double n[3], uint64_t seed,
+                       int rays, double relative, const double *scale, struct gathered *to);
 
 #endif

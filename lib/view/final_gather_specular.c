@@ -58,16 +58,16 @@ static int scatter(const struct view_lobe *lobe, enum lobe_kind kind, int bands,
 	double u[2] = { rng_uniform(&g->random), rng_uniform(&g->random) };
 
 	if (kind == LOBE_RECIPROCAL)
-		lobe_sample_whole(lobe->k, axis, u, dir);
+		bsdf_lobe_sample_whole(lobe->k, axis, u, dir);
 	else
-		lobe_sample(lobe->k, axis, normal, u, dir);
+		bsdf_lobe_sample(lobe->k, axis, normal, u, dir);
 	double cos_i = v3_dot(normal, dir);
 	if (!(cos_i > 0))
 		return 0;
 	double weight = kind == LOBE_RECIPROCAL
 	              ? cos_i / fmax(cos_i, cos_o)
-	              : cos_i / cos_o * lobe_table_normaliser(&lobe->table, cos_o) /
-	                lobe_table_normaliser(&lobe->table, cos_i);
+	              : cos_i / cos_o * bsdf_lobe_table_normaliser(&lobe->table, cos_o) /
+	                bsdf_lobe_table_normaliser(&lobe->table, cos_i);
 	for (int b = 0; b < bands; b++)
 		g->weight[b] *= weight;
 	return 1;
@@ -78,7 +78,7 @@ static void leave(const struct gather_table *t, const struct ray_batch *b, uint3
                   const double normal[3], float org[3])
 {
 	const struct model *m = t->v->m;
-	const uint32_t *c = &m->triangle[3 * (size_t)b->triangle[i]];
+	const uint32_t *c = &m->triangle.corner[3 * (size_t)b->triangle[i]];
 	struct ray_units units = ray_units(t->v->rays);
 	double p = (double)b->w[0][i], q = (double)b->w[1][i], x[3];
 
@@ -90,13 +90,13 @@ static void leave(const struct gather_table *t, const struct ray_batch *b, uint3
 		org[k] = (float)((x[k] - units.centre[k]) * units.per_unit);
 }
 
-void gather_go_on(struct gather_tails *s, const struct gather_table *t, const struct ray_batch *b,
-                  uint32_t i, size_t place, const struct gather_going *g)
+void view_gather_go_on(struct gather_tails *s, const struct gather_table *t, const struct ray_batch *b,
+                       uint32_t i, size_t place, const struct gather_going *g)
 {
 	const struct model *m = t->v->m;
 	const struct view_side *seen =
-		&t->v->side[2 * model_patch_material(m, m->element_patch[place / 2]) + place % 2];
-	const double *front = &m->element_normal[3 * (place / 2)];
+		&t->v->side[2 * model_patch_material(m, m->element.patch[place / 2]) + place % 2];
+	const double *front = &m->element.normal[3 * (place / 2)];
 	struct gather_going *to = &s->going[s->waiting];
 	double dir[3], normal[3];
 	struct way way;
@@ -136,21 +136,21 @@ static uint32_t take(struct gather_tails *s)
 	return n;
 }
 
-void gather_follow(struct gather_tails *s, const struct gather_table *t, uint32_t left, double *sum)
+void view_gather_follow(struct gather_tails *s, const struct gather_table *t, uint32_t left, double *sum)
 {
 	uint32_t place[RAY_BATCH];
 
 	while (s->waiting > left) {
 		uint32_t n = take(s);
 		ray_nearest_batch(t->v->rays, &s->batch, n);
-		gather_places(t, &s->batch, n, place);
+		view_gather_places(t, &s->batch, n, place);
 		s->rays += n;
 		for (uint32_t i = 0; i < n; i++) {
 			if (s->batch.triangle[i] == RAY_MISS)
 				continue;
-			gather_add(t, &s->batch, i, place[i], s->now[i].weight, sum);
+			view_gather_add(t, &s->batch, i, place[i], s->now[i].weight, sum);
 			if (t->kind[place[i]] & GATHER_TAIL)
-				gather_go_on(s, t, &s->batch, i, place[i], &s->now[i]);
+				view_gather_go_on(s, t, &s->batch, i, place[i], &s->now[i]);
 		}
 	}
 }

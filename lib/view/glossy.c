@@ -30,29 +30,29 @@ static double per_density(const struct view_lobe_seen *l, enum lobe_kind kind, d
 {
 	return kind == LOBE_RECIPROCAL
 	     ? cos_i / fmax(cos_i, l->cosine)
-	     : cos_i / l->cosine * lobe_table_normaliser(l->table, l->cosine) /
-	       lobe_table_normaliser(l->table, cos_i);
+	     : cos_i / l->cosine * bsdf_lobe_table_normaliser(l->table, l->cosine) /
+	       bsdf_lobe_table_normaliser(l->table, cos_i);
 }
 
 /* That samples are taken by, of solid angle. */
 static double density(const struct view_lobe_seen *l, enum lobe_kind kind, const double dir[3])
 {
-	double power = lobe_power(l->k, v3_dot(l->axis, dir));
+	double power = bsdf_lobe_power(l->k, v3_dot(l->axis, dir));
 
 	return kind == LOBE_RECIPROCAL ? (l->k + 1) / (2 * pi) * power
-	                               : power / lobe_table_normaliser(l->table, l->cosine);
+	                               : power / bsdf_lobe_table_normaliser(l->table, l->cosine);
 }
 
 static double weight_at(const double dir[3], const void *arg)
 {
 	const struct view_lobe_weight *w = arg;
-	double cos_i = v3_dot(w->l->normal, dir), power = lobe_power(w->l->k, v3_dot(w->l->axis, dir));
+	double cos_i = v3_dot(w->l->normal, dir), power = bsdf_lobe_power(w->l->k, v3_dot(w->l->axis, dir));
 
 	if (!(cos_i > 0) || power == 0)
 		return 0;
 	return w->kind == LOBE_RECIPROCAL
 	     ? (w->l->k + 1) / (2 * pi) * power * cos_i / fmax(cos_i, w->l->cosine)
-	     : power * cos_i / (w->l->cosine * lobe_table_normaliser(w->l->table, cos_i));
+	     : power * cos_i / (w->l->cosine * bsdf_lobe_table_normaliser(w->l->table, cos_i));
 }
 
 struct direct_weight view_lobe_weight(const struct view_lobe_weight *w)
@@ -102,7 +102,7 @@ static void follow(struct run *r, double scale, struct part *to)
 /* Aims at an image of an emitter, for sample i, and follows that. */
 static void follow_aimed(struct run *r, uint32_t i, struct part *to)
 {
-	const struct view_images *images = &r->w->v->images;
+	const struct emitter_images *images = &r->w->v->images;
 	const struct view_lobe_weight weight = { r->l, r->w->v->m->lobe };
 	struct view_branch *next = r->next;
 	uint32_t image;
@@ -110,7 +110,7 @@ static void follow_aimed(struct run *r, uint32_t i, struct part *to)
 
 	for (int k = 0; k < 3; k++)
 		u[k] = rng_sobol(r->first + i, 2 + k, next->seed);
-	double chance = view_aim_at(images, &r->w->aim, u, next->dir, &image);
+	double chance = view_emitter_images_aim(images, &r->w->aim, u, next->dir, &image);
 	if (!(chance > 0))
 		return;
 	next->aimed = 1 + image;
@@ -129,9 +129,9 @@ static void follow_sample(struct run *r, uint32_t i, struct part *to)
 	next->index = r->first + i;
 	double u[2] = { rng_sobol(next->index, 0, next->seed), rng_sobol(next->index, 1, next->seed) };
 	if (kind == LOBE_RECIPROCAL)
-		lobe_sample_whole(l->k, l->axis, u, next->dir);
+		bsdf_lobe_sample_whole(l->k, l->axis, u, next->dir);
 	else
-		lobe_sample(l->k, l->axis, l->normal, u, next->dir);
+		bsdf_lobe_sample(l->k, l->axis, l->normal, u, next->dir);
 	double cos_i = v3_dot(l->normal, next->dir);
 	if (!(cos_i > 0))
 		return;
@@ -160,7 +160,7 @@ static void aim(struct view_walker *w, const struct view_branch *b, const struct
 		other += l->other[i] / w->v->m->bands;
 		most = fmax(most, b->weight[i] * coefficient[i]);
 	}
-	view_aim_begin(&w->v->images, l, worth_aiming * other / most, &w->aim);
+	view_emitter_images_choose(&w->v->images, l, worth_aiming * other / most, &w->aim);
 }
 
 /* Mean and variance of n samples in `parts` parts, with emitters or without. */
@@ -183,7 +183,7 @@ static int settled(const struct run *r, double n)
 {
 	double mean[BANDS_MAX], variance[BANDS_MAX], aim = r->w->shader->lobe_relative;
 
-	measure(r, PARTS, n, !direct_exact(r->w->v->direct), mean, variance);
+	measure(r, PARTS, n, !occ_direct_exact(r->w->v->direct), mean, variance);
 	for (int b = 0; b < r->w->v->m->bands; b++) {
 		double all = aim * (mean[b] + r->l->other[b]);
 		if (variance[b] > all * all)
@@ -239,7 +239,7 @@ static void put_light(struct run *r, int parts, double n, const double *lit)
 	}
 	measure(r, parts, n, 0, mean, q.rest);
 	measure(r, parts, n, 1, mean, q.all);
-	view_shader_put_lobe(r->w->shader, &q);
+	view_shade_tile_put_lobe(r->w->shader, &q);
 }
 
 void view_lobe_follow(struct view_walker *w, const struct view_branch *b,

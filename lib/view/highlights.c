@@ -18,7 +18,7 @@ void view_highlights(const struct view_scene *v, uint32_t material, const double
 	memset(l, 0, bands * sizeof *l);
 	for (size_t i = 0; i < lights->n; i++) {
 		struct light_sight s;
-		light_see(lights, i, x, ray_offset(v->rays), &s);
+		model_light_see(lights, i, x, ray_offset(v->rays), &s);
 		double cosine = v3_dot(n, s.toward), e = fabs(cosine) * s.across * s.falloff;
 		bsdf_eval_lobes(m, material, n, s.toward, out, f);
 		any = 0;
@@ -33,7 +33,7 @@ void view_highlights(const struct view_scene *v, uint32_t material, const double
 			normal[k] = cosine < 0 ? -n[k] : n[k];
 		}
 		ray_leave(v->rays, normal, from);
-		if (!light_way(&v->ways, i, from, &s, f, rays))
+		if (!ray_light_visibility(&v->ways, i, from, &s, f, rays))
 			continue;
 		for (size_t b = 0; b < bands; b++)
 			l[b] += f[b];

@@ -3,18 +3,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-int view_shader_init(struct view_shader *s, const struct view_scene *v, struct gather *gather,
-                     double relative, double lobe_relative, int thread, struct err *e)
+int view_shade_tile_init(struct view_shade_tile *s, const struct view_scene *v, struct gather *gather,
+                         double relative, double lobe_relative, int thread, struct err *e)
 {
-	*s = (struct view_shader){ .v = v, .relative = relative, .lobe_relative = lobe_relative,
+	*s = (struct view_shade_tile){ .v = v, .relative = relative, .lobe_relative = lobe_relative,
 	                           .gather = gather, .thread = thread };
-	s->direct = direct_worker_new(v->direct, e);
+	s->direct = occ_direct_worker_new(v->direct, e);
 	return s->direct ? 0 : -1;
 }
 
-void view_shader_free(struct view_shader *s)
+void view_shade_tile_free(struct view_shade_tile *s)
 {
-	direct_worker_free(s->direct);
+	occ_direct_worker_free(s->direct);
 	free(s->request.data);
 	free(s->weight.data);
 	free(s->order.data);
@@ -23,25 +23,25 @@ void view_shader_free(struct view_shader *s)
 }
 
 /* Puts the last request of `of` in the order of element-sides. */
-static void put_order(struct view_shader *s, struct vec *order, const struct vec *of,
+static void put_order(struct view_shade_tile *s, struct vec *order, const struct vec *of,
                       uint32_t element, int side)
 {
 	uint64_t key = (2 * (uint64_t)element + (uint64_t)side) << 31 | (of->n - 1);
 
-	vec_append(order, &key, 1, sizeof key, &s->e);
+	mem_append(order, &key, 1, sizeof key, &s->e);
 }
 
-void view_shader_put(struct view_shader *s, const struct view_request *q, const double *weight)
+void view_shade_tile_put(struct view_shade_tile *s, const struct view_request *q, const double *weight)
 {
 	const struct view_side *side = &s->v->side[2 * q->material + (uint32_t)q->side];
 
 	for (int k = 0; k < 2 && s->asking; k++)
 		if (k == q->side ? side->diffuse : side->translucent)
-			gather_want(s->gather, 2 * q->element + (uint32_t)k);
+			view_gather_want(s->gather, 2 * q->element + (uint32_t)k);
 	if (s->asking)
 		return;
-	if (vec_append(&s->request, q, 1, sizeof *q, &s->e) ||
-	    vec_append(&s->weight, weight, (size_t)s->v->m->bands, sizeof *weight, &s->e))
+	if (mem_append(&s->request, q, 1, sizeof *q, &s->e) ||
+	    mem_append(&s->weight, weight, (size_t)s->v->m->bands, sizeof *weight, &s->e))
 		return;
 	if (side->diffuse)
 		put_order(s, &s->order, &s->request, q->element, q->side);
@@ -49,9 +49,9 @@ void view_shader_put(struct view_shader *s, const struct view_request *q, const 
 		put_order(s, &s->order, &s->request, q->element, !q->side);
 }
 
-void view_shader_put_lobe(struct view_shader *s, const struct view_lobe_request *q)
+void view_shade_tile_put_lobe(struct view_shade_tile *s, const struct view_lobe_request *q)
 {
-	if (!vec_append(&s->lobe, q, 1, sizeof *q, &s->e))
+	if (!mem_append(&s->lobe, q, 1, sizeof *q, &s->e))
 		put_order(s, &s->lobe_order, &s->lobe, q->l.element, q->l.side);
 }
 
@@ -63,7 +63,7 @@ static int by_key(const void *x, const void *y)
 }
 
 /* Adds the light that arrives on a side of a point. */
-static void shade(struct view_shader *s, size_t request, int side, const struct view_sums *to)
+static void shade(struct view_shade_tile *s, size_t request, int side, const struct view_sums *to)
 {
 	size_t bands = (size_t)s->v->m->bands;
 	const struct view_request *q = (const struct view_request *)s->request.data + request;
@@ -74,9 +74,9 @@ static void shade(struct view_shader *s, size_t request, int side, const struct 
 	double *square = to->square + q->slot * bands;
 	double h[BANDS_MAX], error[BANDS_MAX], other[BANDS_MAX];
 
-	reconstruction_at(s->gather ? &s->v->all : &s->v->part, q->element, side, q->w, other);
-	direct_begin(s->direct, 2 * q->element + (uint32_t)side);
-	if (direct_at(s->direct, q->x, q->seed, s->relative, other, h, error, &s->e))
+	interp_reconstruction_at(s->gather ? &s->v->all : &s->v->part, q->element, side, q->w, other);
+	occ_direct_begin(s->direct, 2 * q->element + (uint32_t)side);
+	if (occ_direct_at(s->direct, q->x, q->seed, s->relative, other, h, error, &s->e))
 		return;
 	for (size_t b = 0; b < bands; b++) {
 		double off = weight[b] * part[b] * error[b];
@@ -86,7 +86,7 @@ static void shade(struct view_shader *s, size_t request, int side, const struct 
 	if (!s->gather)
 		return;
 	struct gathered found;
-	gather_at(s->gather, 2 * q->element + (uint32_t)side, q->x, q->w, q->seed, s->thread, &found);
+	view_gather_at(s->gather, 2 * q->element + (uint32_t)side, q->x, q->w, q->seed, s->thread, &found);
 	for (size_t b = 0; b < bands; b++) {
 		double off = weight[b] * part[b] * found.error[b];
 		light[b] += weight[b] * part[b] * found.h[b];
@@ -96,7 +96,7 @@ static void shade(struct view_shader *s, size_t request, int side, const struct 
 }
 
 /* Adds the light of emitters in a lobe. */
-static void shade_lobe(struct view_shader *s, size_t request, const struct view_sums *to)
+static void shade_lobe(struct view_shade_tile *s, size_t request, const struct view_sums *to)
 {
 	const struct view_lobe_request *q = (const struct view_lobe_request *)s->lobe.data + request;
 	struct view_lobe_weight lobe = { &q->l, s->v->m->lobe };
@@ -104,9 +104,9 @@ static void shade_lobe(struct view_shader *s, size_t request, const struct view_
 	size_t at = q->slot * (size_t)s->v->m->bands;
 	double h[BANDS_MAX];
 
-	direct_begin(s->direct, 2 * q->l.element + (uint32_t)q->l.side);
-	int sampled = direct_sampled(s->direct);
-	if (!sampled && direct_weighted(s->direct, q->l.x, &weight, h, &s->e))
+	occ_direct_begin(s->direct, 2 * q->l.element + (uint32_t)q->l.side);
+	int sampled = occ_direct_sampled(s->direct);
+	if (!sampled && occ_direct_weighted(s->direct, q->l.x, &weight, h, &s->e))
 		return;
 	for (int b = 0; b < s->v->m->bands; b++, at++) {
 		to->directional[at] += sampled ? q->found[b] : q->weight[b] * h[b];
@@ -114,7 +114,7 @@ static void shade_lobe(struct view_shader *s, size_t request, const struct view_
 	}
 }
 
-void view_shader_run(struct view_shader *s, const struct view_sums *to)
+void view_shade_tile_run(struct view_shade_tile *s, const struct view_sums *to)
 {
 	const uint64_t *order = s->order.data, *lobe = s->lobe_order.data;
 

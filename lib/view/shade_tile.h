@@ -30,7 +30,7 @@ struct view_lobe_request {
 };
 
 /* One thread's. */
-struct view_shader {
+struct view_shade_tile {
 	const struct view_scene *v;
 	double relative;            /* error of sampled light to aim at, and of */
 	double lobe_relative;       /* samples of lobes */
@@ -46,12 +46,12 @@ struct view_shader {
 };
 
 /* 0, or -1 and e. To be freed in any case. */
-int view_shader_init(struct view_shader *s, const struct view_scene *v, struct gather *gather,
-                     double relative, double lobe_relative, int thread, struct err *e);
-void view_shader_free(struct view_shader *s);
+int view_shade_tile_init(struct view_shade_tile *s, const struct view_scene *v, struct gather *gather,
+                         double relative, double lobe_relative, int thread, struct err *e);
+void view_shade_tile_free(struct view_shade_tile *s);
 
-void view_shader_put(struct view_shader *s, const struct view_request *q, const double *weight);
-void view_shader_put_lobe(struct view_shader *s, const struct view_lobe_request *q);
+void view_shade_tile_put(struct view_shade_tile *s, const struct view_request *q, const double *weight);
+void view_shade_tile_put_lobe(struct view_shade_tile *s, const struct view_lobe_request *q);
 
 /* Of samples, or sums over those of a pixel, [samples or pixels][bands]. */
 struct view_sums {
@@ -63,6 +63,6 @@ struct view_sums {
 };
 
 /* Shades the points collected since the last call and forgets them. */
-void view_shader_run(struct view_shader *s, const struct view_sums *to);
+void view_shade_tile_run(struct view_shade_tile *s, const struct view_sums *to);
 
 #endif

@@ -41,9 +41,9 @@ static int meet(const struct view_scene *v, const double org[3], const double di
 	if (hit.triangle == RAY_MISS)
 		return 0;
 	p->element = model_locate(m, hit.triangle, hit.w);
-	p->material = m->surface.material[m->triangle_surface[hit.triangle]];
+	p->material = m->surface.material[m->triangle.surface[hit.triangle]];
 	p->side = hit.side;
-	memcpy(p->n, &m->element_normal[3 * (size_t)p->element], sizeof p->n);
+	memcpy(p->n, &m->element.normal[3 * (size_t)p->element], sizeof p->n);
 	memcpy(p->w, hit.w, sizeof p->w);
 	p->cosine = fabs(v3_dot(p->n, dir));
 	p->way = hit.t;
@@ -51,9 +51,9 @@ static int meet(const struct view_scene *v, const double org[3], const double di
 }
 
 /* The point itself, from the corners: closer to the plane than along the ray. */
-static void locate(const struct view_scene *v, struct point *p)
+static void ray_locate(const struct view_scene *v, struct point *p)
 {
-	const uint32_t *c = &v->m->element[3 * (size_t)p->element];
+	const uint32_t *c = &v->m->element.corner[3 * (size_t)p->element];
 
 	for (size_t k = 0; k < 3; k++)
 		p->x[k] = p->w[0] * v->m->vertex[3 * (size_t)c[0] + k] +
@@ -85,7 +85,7 @@ static int see(const struct view_scene *v, const double org[3], const double dir
 	for (int i = 0; v->side[2 * p->material + (uint32_t)p->side].black; i++) {
 		if (!passes || i == PASSES_MAX)
 			return 0;
-		locate(v, p);
+		ray_locate(v, p);
 		leave(v, p, FRONT, from);
 		++*rays;
 		if (!meet(v, from, dir, p))
@@ -101,10 +101,10 @@ static void put_request(struct view_walker *w, const struct view_branch *b, stru
 	                          .material = p->material, .directional = b->depth > 0,
 	                          .seed = b->seed + b->index };
 
-	locate(w->v, p);
+	ray_locate(w->v, p);
 	memcpy(q.x, p->x, sizeof q.x);
 	memcpy(q.w, p->w, sizeof q.w);
-	view_shader_put(w->shader, &q, b->weight);
+	view_shade_tile_put(w->shader, &q, b->weight);
 }
 
 /* Adds the error of the interpolated light that a side shows. */
@@ -122,7 +122,7 @@ static void add_error(struct view_walker *w, const struct view_branch *b, const 
 	}
 	/* The part of the lobe that the element fills. */
 	double way = b->reach + p->way;
-	double part = b->density * w->v->m->element_area[p->element] * p->cosine / (way * way);
+	double part = b->density * w->v->m->element.area[p->element] * p->cosine / (way * way);
 	for (size_t i = 0; i < bands; i++)
 		w->blurred[i] += b->weight[i] * b->weight[i] *
 		                 (s->here[i] * s->here[i] * view_blurred(w->v, at + i, part, 0) +
@@ -133,15 +133,15 @@ static void add_error(struct view_walker *w, const struct view_branch *b, const 
 static double aimed_share(const struct view_walker *w, const struct view_branch *b,
                           const struct point *p)
 {
-	const struct view_images *s = &w->v->images;
+	const struct emitter_images *s = &w->v->images;
 
 	if (!b->lobes || b->straight || b->turns < 0 || !(w->aim.sum > 0))
 		return 1;
 	uint32_t emitter = s->of[2 * p->element + (uint32_t)p->side];
 	if (emitter == UINT32_MAX)
 		return 1;
-	double other = view_aim_density(s, &w->aim, (size_t)b->turns * s->emitters.n + emitter,
-	                                b->reach + p->way, p->cosine);
+	double other = view_emitter_images_density(s, &w->aim, (size_t)b->turns * s->emitters.n + emitter,
+	                                           b->reach + p->way, p->cosine);
 	return b->density / (b->density + other);
 }
 
@@ -159,11 +159,11 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b, str
 
 	if (computed && (s->diffuse || s->translucent))
 		put_request(w, b, p);
-	reconstruction_at(r, p->element, p->side, p->w, h);
+	interp_reconstruction_at(r, p->element, p->side, p->w, h);
 	for (size_t i = 0; i < bands; i++)
 		diffuse[i] += b->weight[i] * s->here[i] * h[i];
 	if (s->translucent) {
-		reconstruction_at(r, p->element, !p->side, p->w, h);
+		interp_reconstruction_at(r, p->element, !p->side, p->w, h);
 		for (size_t i = 0; i < bands; i++)
 			diffuse[i] += b->weight[i] * s->across[i] * h[i];
 	}
@@ -216,14 +216,14 @@ static void branch_into(struct view_walker *w, const struct view_branch *b, cons
 	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
 	struct view_lobe_seen l = { .k = lobe->k, .cosine = fmax(p->cosine, 1e-14),
 	                            .element = p->element, .side = side, .table = &lobe->table };
-	double scale = w->v->m->lobe == LOBE_RECIPROCAL ? lobe_albedo(lobe->k, p->cosine) : 1;
+	double scale = w->v->m->lobe == LOBE_RECIPROCAL ? bsdf_lobe_albedo(lobe->k, p->cosine) : 1;
 
 	memcpy(l.axis, next->dir, sizeof l.axis);
 	memcpy(l.x, p->x, sizeof l.x);
 	for (int k = 0; k < 3; k++)
 		l.normal[k] = side == FRONT ? p->n[k] : -p->n[k];
 	if (w->o->lobe_samples || b->lobes) {
-		reconstruction_at(&w->v->all, p->element, p->side, p->w, l.other);
+		interp_reconstruction_at(&w->v->all, p->element, p->side, p->w, l.other);
 		for (int i = 0; i < w->v->m->bands; i++)
 			l.other[i] = b->weight[i] * s->here[i] * l.other[i] + w->directional[i];
 		view_lobe_follow(w, b, &l, lobe->coefficient, next);
@@ -239,7 +239,7 @@ static void branch_into(struct view_walker *w, const struct view_branch *b, cons
 /* How a mirror has turned what met none before: branches' `turns`. */
 static int turned(const struct view_scene *v, const struct point *p)
 {
-	int plane = view_images_plane(&v->images, p->material, p->side, p->n, p->x);
+	int plane = view_emitter_images_plane(&v->images, p->material, p->side, p->n, p->x);
 
 	return plane < 0 ? -1 : 1 + plane;
 }
@@ -272,15 +272,15 @@ static void branch_off(struct view_walker *w, const struct view_branch *b,
 /* Goes on along the one way that leads to an image; adds its emitter at the end. */
 static void follow_aimed(struct view_walker *w, const struct view_branch *b, struct point *p)
 {
-	const struct view_images *s = &w->v->images;
+	const struct emitter_images *s = &w->v->images;
 	const struct view_side *seen = &w->v->side[2 * p->material + (uint32_t)p->side];
 	size_t image = b->aimed - 1;
 	int plane = (int)(image / s->emitters.n) - 1;
 	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] }, l[BANDS_MAX];
 
-	locate(w->v, p);
+	ray_locate(w->v, p);
 	if (b->turns == 0 && plane >= 0 &&
-	    view_images_plane(s, p->material, p->side, p->n, p->x) == plane) {
+	    view_emitter_images_plane(s, p->material, p->side, p->n, p->x) == plane) {
 		branch_off(w, b, p, &seen->reflected, 0);
 	} else if (s->of[2 * p->element + (uint32_t)p->side] == image % s->emitters.n) {
 		if (b->straight || b->turns != plane + 1)
@@ -308,7 +308,7 @@ static void follow_branch(struct view_walker *w, const struct view_branch *b)
 	const struct view_side *s = &v->side[2 * p.material + (uint32_t)p.side];
 	if (!s->reflected.coefficient && !s->transmitted.coefficient)
 		return;
-	locate(v, &p);
+	ray_locate(v, &p);
 	if (v->highlights)
 		add_highlights(w, b, &p);
 	if (s->reflected.coefficient)
@@ -345,7 +345,7 @@ void view_first_seen(const struct view_scene *v, const double org[3], const doub
 	first->element = RAY_MISS;
 	if (!see(v, org, dir, 1, &p, &rays))
 		return;
-	locate(v, &p);
+	ray_locate(v, &p);
 	first->element = p.element;
 	memcpy(first->point, p.x, sizeof p.x);
 	for (int k = 0; k < 3; k++)

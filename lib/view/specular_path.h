@@ -39,9 +39,9 @@ struct view_scene {
 	struct view_side *side;     /* [2 materials] */
 	int lobes;                  /* there are finite lobes */
 	int tails;                  /* something reflects or transmits directionally */
-	struct view_images images;  /* if there are such */
+	struct emitter_images images;  /* if there are such */
 	int highlights;             /* there are punctual lights, and finite lobes */
-	struct light_ways ways;     /* of them, if so */
+	struct light_visibility ways;     /* of them, if so */
 	double ceiling[BANDS_MAX];  /* no radiance along an unsampled tail exceeds it */
 };
 
@@ -79,12 +79,12 @@ struct view_first {
 	double point[3], normal[3];
 };
 
-struct view_shader;
+struct view_shade_tile;
 
 struct view_walker {
 	const struct view_scene *v;
 	const struct view_options *o;
-	struct view_shader *shader; /* for points and lobes whose light is to be computed; NULL:
+	struct view_shade_tile *shader; /* for points and lobes whose light is to be computed; NULL:
 	                               there are none */
 	uint32_t slot;              /* of the sample, that it is told with them */
 	int asking;                 /* lobes are not sampled: light is only asked for */

@@ -40,7 +40,7 @@ struct tile_sum {
 /* A thread's scratch space: pixels of one tile at a time. */
 struct worker {
 	struct view_branch *stack;
-	struct view_shader shader;
+	struct view_shade_tile shader;
 	struct view_sums slots;     /* [pixels ROUND][bands] */
 	struct view_sums sums;      /* [pixels][bands] */
 	int samples[TILE * TILE];   /* of each pixel so far; negative when it needs no more */
@@ -78,7 +78,7 @@ static struct tile tile_at(const struct render *r, size_t t)
 
 static void store(const struct render *r, int plane, size_t pixel, double value)
 {
-	image_plane(r->picture, plane)[pixel] = (float)value;
+	picture_image_plane(r->picture, plane)[pixel] = (float)value;
 }
 
 /* Bands as R, G, B. */
@@ -96,19 +96,19 @@ static void store_first(const struct render *r, size_t pixel, double x, double y
 	struct view_first first;
 	double org[3], dir[3];
 
-	camera_ray(r->f, x, y, org, dir);
+	picture_camera_ray(r->f, x, y, org, dir);
 	view_first_seen(r->v, org, dir, &first);
 	int seen = first.element != RAY_MISS;
 	if (r->at.z >= 0)
 		store(r, r->at.z, pixel,
-		      seen ? camera_depth(r->f, first.point) : (double)INFINITY);
+		      seen ? picture_camera_depth(r->f, first.point) : (double)INFINITY);
 	for (int k = 0; k < 3 && r->at.normal >= 0; k++)
 		store(r, r->at.normal + k, pixel, seen ? first.normal[k] : 0);
 	if (r->at.element >= 0)
 		store(r, r->at.element, pixel, seen ? first.element : -1.);
 	if (r->at.patch >= 0)
 		store(r, r->at.patch, pixel,
-		      seen ? r->v->m->element_patch[first.element] : -1.);
+		      seen ? r->v->m->element.patch[first.element] : -1.);
 }
 
 /* Follows sample s of a pixel; its light goes into the walker. */
@@ -124,7 +124,7 @@ static void follow_sample(const struct render *r, struct view_walker *w, int i, 
 	memset(w->error, 0, bands * sizeof *w->error);
 	memset(w->axial, 0, bands * sizeof *w->axial);
 	w->probing = s == 0 && !w->asking && i % PROBE == PROBE / 2 && j % PROBE == PROBE / 2;
-	camera_ray(r->f, i + r->spot[s][0], j + r->spot[s][1], b.org, b.dir);
+	picture_camera_ray(r->f, i + r->spot[s][0], j + r->spot[s][1], b.org, b.dir);
 	view_follow(w, &b);
 }
 
@@ -260,7 +260,7 @@ static void trace_round(const struct render *r, struct worker *k, const struct t
 			keep_sample(w, bands, &k->slots);
 		}
 	if (w->shader)
-		view_shader_run(w->shader, &k->slots);
+		view_shade_tile_run(w->shader, &k->slots);
 	for (int p = 0; p < tile->pixels; p++)
 		if (k->samples[p] == from) {
 			add_round(&k->slots, (size_t)p, to - from, bands, &k->sums);
@@ -328,9 +328,9 @@ static int new_worker(const struct render *r, struct worker *k, int thread, stru
 	if (!shades(r))
 		return 0;
 	double relative = r->o->relative / 2, usual = sqrt(r->o->samples);
-	return view_shader_init(&k->shader, r->v, r->gather,
-	                        relative > 0 ? relative : fmin(1, usual_error * usual),
-	                        relative > 0 ? relative : fmin(1, usual_lobe_error * usual), thread, e);
+	return view_shade_tile_init(&k->shader, r->v, r->gather,
+	                            relative > 0 ? relative : fmin(1, usual_error * usual),
+	                            relative > 0 ? relative : fmin(1, usual_lobe_error * usual), thread, e);
 }
 
 static void free_workers(struct render *r)
@@ -339,7 +339,7 @@ static void free_workers(struct render *r)
 		free(r->worker[t].stack);
 		free(r->worker[t].slots.diffuse);
 		free(r->worker[t].sums.diffuse);
-		view_shader_free(&r->worker[t].shader);
+		view_shade_tile_free(&r->worker[t].shader);
 	}
 	free(r->worker);
 }
@@ -351,7 +351,7 @@ static int new_gather(struct render *r, struct err *e)
 		                    .relative = r->o->relative / 2,
 		                    .depth = r->o->depth, .threads = r->o->threads };
 
-	r->gather = r->v->method == VIEW_GATHER ? gather_new(r->v, &o, e) : NULL;
+	r->gather = r->v->method == VIEW_GATHER ? view_gather_new(r->v, &o, e) : NULL;
 	return r->gather || r->v->method != VIEW_GATHER ? 0 : -1;
 }
 
@@ -363,7 +363,7 @@ static void gather(struct render *r, size_t tiles, const struct progress *progre
 	par_for(tiles, 1, r->o->threads, ask_tiles, r, NULL);
 	for (int t = 0; t < r->o->threads; t++)
 		r->worker[t].shader.asking = 0;
-	gather_corners(r->gather, progress);
+	view_gather_corners(r->gather, progress);
 }
 
 static int new_buffers(struct render *r, size_t tiles, struct err *e)
@@ -409,7 +409,7 @@ static int failed(const struct render *r, struct err *e)
 	for (int t = 0; t < r->o->threads; t++)
 		if (r->worker[t].shader.e.set)
 			return err_set(e, "%s", r->worker[t].shader.e.text);
-	return r->gather ? gather_check(r->gather, e) : 0;
+	return r->gather ? view_gather_check(r->gather, e) : 0;
 }
 
 int view_render(const struct view_scene *v, const struct view_frame *f,
@@ -432,9 +432,9 @@ int view_render(const struct view_scene *v, const struct view_frame *f,
 		bad = failed(&r, e);
 	}
 	if (r.gather && !bad)
-		stats->rays += gather_rays(r.gather);
+		stats->rays += view_gather_rays(r.gather);
 	free_workers(&r);
-	gather_free(r.gather);
+	view_gather_free(r.gather);
 	free(r.spot);
 	free(r.tile);
 	return bad;

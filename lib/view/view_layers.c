@@ -65,5 +65,5 @@ int view_picture_new(const struct view_frame *f, unsigned l, int bands, struct v
 	at->error = add_names(&s, l & VIEW_ERROR, "error.", rgb, 3);
 	for (int i = 0; i < s.n; i++)
 		list[i] = s.text[i];
-	return image_new(picture, f->width, f->height, s.n, list, e);
+	return picture_image_new(picture, f->width, f->height, s.n, list, e);
 }

@@ -15,13 +15,13 @@ static void make_lobe(struct view_lobe *lobe, const double *coefficient, int ban
 		if (coefficient[b] > 0)
 			lobe->coefficient = coefficient;
 	if (lobe->coefficient && !isinf(k))
-		lobe_table_make(&lobe->table, k);
+		bsdf_lobe_table_make(&lobe->table, k);
 }
 
 static void tabulate_side(const struct materials *mt, size_t material, int side,
                           struct view_side *s)
 {
-	size_t here = material_at(mt, material, side), across = material_at(mt, material, !side);
+	size_t here = model_material_at(mt, material, side), across = model_material_at(mt, material, !side);
 
 	s->black = side == BACK && mt->one_sided[material];
 	for (int b = 0; b < mt->bands; b++) {
@@ -44,7 +44,7 @@ static double corner_ceiling(const struct view_scene *v, size_t material, int si
 	const struct materials *mt = &v->m->material;
 	const struct view_side *s = &v->side[2 * material + (size_t)side];
 	double m = mt->emission_exponent[2 * material + (size_t)side];
-	double own = mt->emission[material_at(mt, material, side) + (size_t)band];
+	double own = mt->emission[model_material_at(mt, material, side) + (size_t)band];
 	double kept = 1;
 
 	if (own > 0 && m < 1)
@@ -67,8 +67,8 @@ static void find_ceiling(struct view_scene *v)
 
 	for (size_t b = 0; b < bands && v->highlights; b++)
 		v->ceiling[b] = INFINITY;
-	for (size_t c = 0; c < 3 * m->elements; c++) {
-		size_t material = model_patch_material(m, m->element_patch[c / 3]);
+	for (size_t c = 0; c < 3 * m->element.n; c++) {
+		size_t material = model_patch_material(m, m->element.patch[c / 3]);
 		for (int side = 0; side < 2; side++)
 			for (int b = 0; b < m->bands && !v->side[2 * material + (size_t)side].black; b++)
 				v->ceiling[b] = fmax(v->ceiling[b],
@@ -112,8 +112,8 @@ static double without(const double *all, const double *part, size_t at)
 double view_blurred(const struct view_scene *v, size_t at, double part, int computed)
 {
 	const struct solution *s = v->s;
-	double noise = without(s->error, computed ? s->error_direct : NULL, at);
-	double missed = without(s->discretisation, computed ? s->discretisation_direct : NULL, at);
+	double noise = without(s->error.sampling, computed ? s->error.sampling_direct : NULL, at);
+	double missed = without(s->error.discretisation, computed ? s->error.discretisation_direct : NULL, at);
 
 	/* What is so near stands at an edge, where a linear fit has four times the variance that
 	 * it has in the middle. */
@@ -125,8 +125,8 @@ double view_blurred(const struct view_scene *v, size_t at, double part, int comp
 static int part_solution(const struct solution *s, unsigned parts, struct solution *out, struct err *e)
 {
 	size_t n = s->element_sides * (size_t)s->bands;
-	double **to[] = { &out->direct, &out->caustic, &out->indirect };
-	const double *from[] = { s->direct, s->caustic, s->indirect };
+	double **to[] = { &out->irradiance.direct, &out->irradiance.caustic, &out->irradiance.indirect };
+	const double *from[] = { s->irradiance.direct, s->irradiance.caustic, s->irradiance.indirect };
 
 	*out = (struct solution){ .groups = 1, .element_sides = s->element_sides, .bands = s->bands };
 	for (int p = 0; p < 3; p++) {
@@ -136,12 +136,12 @@ static int part_solution(const struct solution *s, unsigned parts, struct soluti
 			for (size_t i = 0; i < n && (parts >> p & 1); i++)
 				(*to[p])[i] += from[p][g * n + i];
 	}
-	out->error = mem_new(n, sizeof *out->error, "errors", e);
-	out->error_direct = mem_new(n, sizeof *out->error_direct, "errors", e);
-	out->discretisation = mem_new(n, sizeof *out->discretisation, "errors", e);
-	out->discretisation_direct = mem_new(n, sizeof *out->discretisation, "errors", e);
-	return out->error && out->error_direct && out->discretisation &&
-	       out->discretisation_direct ? 0 : -1;
+	out->error.sampling = mem_new(n, sizeof *out->error.sampling, "errors", e);
+	out->error.sampling_direct = mem_new(n, sizeof *out->error.sampling_direct, "errors", e);
+	out->error.discretisation = mem_new(n, sizeof *out->error.discretisation, "errors", e);
+	out->error.discretisation_direct = mem_new(n, sizeof *out->error.discretisation, "errors", e);
+	return out->error.sampling && out->error.sampling_direct && out->error.discretisation &&
+	       out->error.discretisation_direct ? 0 : -1;
 }
 
 /* The errors of the parts that are interpolated: noise, which light straight from emitters
@@ -154,15 +154,15 @@ static int part_errors(const struct view_scene *v, const struct solution *s, int
 
 	if (part_solution(s, parts, some, e))
 		return -1;
-	for (size_t i = 0; i < n && s->error; i++) {
-		double h = some->direct[i] + some->caustic[i] + some->indirect[i], all = h;
+	for (size_t i = 0; i < n && s->error.sampling; i++) {
+		double h = some->irradiance.direct[i] + some->irradiance.caustic[i] + some->irradiance.indirect[i], all = h;
 		for (size_t g = 0; g < s->groups && parts == PART_CAUSTIC; g++)
-			all += s->direct[g * n + i] + s->indirect[g * n + i];
-		some->error[i] = all > 0 ? s->error[i] * h / all : 0;
-		if (s->error_direct && parts & PART_DIRECT)
-			some->error_direct[i] = s->error_direct[i];
+			all += s->irradiance.direct[g * n + i] + s->irradiance.indirect[g * n + i];
+		some->error.sampling[i] = all > 0 ? s->error.sampling[i] * h / all : 0;
+		if (s->error.sampling_direct && parts & PART_DIRECT)
+			some->error.sampling_direct[i] = s->error.sampling_direct[i];
 	}
-	return discretisation_estimate(v->m, some, threads, e);
+	return interp_discretisation(v->m, some, threads, e);
 }
 
 /* The standard error of what is interpolated. */
@@ -172,8 +172,8 @@ static int find_misses(struct view_scene *v, const struct solution *s, int threa
 	struct solution some = { 0 };
 	int whole = v->method == VIEW_MESH;
 	int bad = whole ? 0 : part_errors(v, s, threads, &some, e);
-	const double *noise = whole ? s->error : some.error;
-	const double *missed = whole ? s->discretisation : some.discretisation;
+	const double *noise = whole ? s->error.sampling : some.error.sampling;
+	const double *missed = whole ? s->error.discretisation : some.error.discretisation;
 
 	v->miss = mem_new(n, sizeof *v->miss, "errors", e);
 	for (size_t i = 0; i < n && v->miss && !bad; i++)
@@ -187,10 +187,10 @@ static int find_misses(struct view_scene *v, const struct solution *s, int threa
 static int interpolate(struct view_scene *v, const struct solution *s, int threads, struct err *e)
 {
 	if ((v->method != VIEW_DIRECT || v->tails) &&
-	    reconstruct(v->m, s, PART_ALL, threads, &v->all, e))
+	    interp_reconstruct(v->m, s, PART_ALL, threads, &v->all, e))
 		return -1;
 	return v->method != VIEW_MESH &&
-	       reconstruct(v->m, s, interpolated[v->method], threads, &v->part, e) ? -1 : 0;
+	       interp_reconstruct(v->m, s, interpolated[v->method], threads, &v->part, e) ? -1 : 0;
 }
 
 struct view_scene *view_scene_new(const struct model *m, const struct solution *s,
@@ -206,9 +206,9 @@ struct view_scene *view_scene_new(const struct model *m, const struct solution *
 	v->rays = rays;
 	v->method = method;
 	if (!tabulate(v, e) && !interpolate(v, s, threads, e) && !find_misses(v, s, threads, e) &&
-	    ((method == VIEW_MESH && !v->lobes) || (v->direct = direct_new(m, rays, e))) &&
-	    (!v->lobes || !view_images_init(&v->images, m, e)) &&
-	    (!v->highlights || !light_ways_new(m, rays, &v->ways, e))) {
+	    ((method == VIEW_MESH && !v->lobes) || (v->direct = occ_direct_new(m, rays, e))) &&
+	    (!v->lobes || !view_emitter_images_init(&v->images, m, e)) &&
+	    (!v->highlights || !ray_light_visibility_new(m, rays, &v->ways, e))) {
 		if (v->tails)
 			find_ceiling(v);
 		return v;
@@ -226,11 +226,11 @@ void view_scene_free(struct view_scene *v)
 {
 	if (!v)
 		return;
-	direct_free(v->direct);
-	view_images_free(&v->images);
-	light_ways_free(&v->ways);
-	reconstruction_free(&v->all);
-	reconstruction_free(&v->part);
+	occ_direct_free(v->direct);
+	view_emitter_images_free(&v->images);
+	ray_light_visibility_free(&v->ways);
+	interp_reconstruction_free(&v->all);
+	interp_reconstruction_free(&v->part);
 	free(v->miss);
 	free(v->side);
 	free(v);

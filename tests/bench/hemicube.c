@@ -32,7 +32,7 @@ static void *must(void *p)
 	return p;
 }
 
-static uint32_t add_vertex(struct model *m, const double p[3])
+static uint32_t mesh_add_vertex(struct model *m, const double p[3])
 {
 	for (size_t k = 0; k < 3; k++)
 		m->vertex[3 * m->vertices + k] = p[k];
@@ -50,15 +50,15 @@ static void add_grid(struct model *m, const double o[3], const double u[3], cons
 			double p[3];
 			v3_mad(o, (double)i / (double)n, u, p);
 			v3_mad(p, (double)j / (double)n, v, p);
-			add_vertex(m, p);
+			mesh_add_vertex(m, p);
 		}
 	for (size_t j = 0; j < n; j++)
 		for (size_t i = 0; i < n; i++) {
 			uint32_t a = (uint32_t)(first + j * (n + 1) + i), c = a + (uint32_t)n + 1;
 			uint32_t t[6] = { a, a + 1, c + 1, a, c + 1, c };
 			for (size_t k = 0; k < 6; k++)
-				m->element[3 * m->elements + k] = t[k];
-			m->elements += 2;
+				m->element.corner[3 * m->element.n + k] = t[k];
+			m->element.n += 2;
 		}
 }
 
@@ -97,7 +97,7 @@ static struct model room(size_t wall, size_t spheres, size_t rings, size_t boxes
 	double lo[3] = { 0, 0, 0 }, size[3] = { 6, 5, 3 };
 
 	m.vertex = must(malloc(4 * elements * 3 * sizeof(double)));
-	m.element = must(malloc(elements * 3 * sizeof(uint32_t)));
+	m.element.corner = must(malloc(elements * 3 * sizeof(uint32_t)));
 	add_box(&m, lo, size, wall);
 	for (size_t i = 0; i < spheres; i++) {
 		double c[3] = { .5 + 5 * rng_uniform(&r), .5 + 4 * rng_uniform(&r),
@@ -134,14 +134,14 @@ static void room_view(struct rng *r, size_t i, double eye[3], double normal[3])
 static uint32_t element_view(const struct model *m, struct rng *r, double eye[3],
                              double normal[3])
 {
-	size_t e = (size_t)(rng_uniform(r) * (double)m->elements);
+	size_t e = (size_t)(rng_uniform(r) * (double)m->element.n);
 
 	for (size_t k = 0; k < 3; k++) {
 		eye[k] = 0;
-		normal[k] = m->element_normal[3 * e + k];
+		normal[k] = m->element.normal[3 * e + k];
 	}
 	for (size_t c = 0; c < 3; c++)
-		v3_mad(eye, 1. / 3, &m->vertex[3 * (size_t)m->element[3 * e + c]], eye);
+		v3_mad(eye, 1. / 3, &m->vertex[3 * (size_t)m->element.corner[3 * e + c]], eye);
 	return (uint32_t)e;
 }
 
@@ -166,40 +166,40 @@ static void report(const char *what, const char *name, int n, double *ms, size_t
 static void measure(const char *name, const struct model *m, int n, size_t repeats)
 {
 	struct err e = { 0 };
-	struct hemi_grid g = { 0 };
+	struct hemicube_grid g = { 0 };
 	struct hemicube h = { 0 };
 	struct rng r = rng_seed(1, 1);
 	double *render = must(malloc(repeats * sizeof *render)), begun = seconds();
 	double *gather = must(malloc(repeats * sizeof *gather));
-	double *f = must(calloc(2 * m->elements, sizeof *f)), escape = 0;
-	struct hemi_scene *s = hemi_scene_new(m, &e);
+	double *f = must(calloc(2 * m->element.n, sizeof *f)), escape = 0;
+	struct hemicube_scene *s = ff_hemicube_scene_new(m, &e);
 
 	printf("build_ms.%s %.1f\n", name, 1e3 * (seconds() - begun));
-	if (!s || hemi_grid_init(&g, n, &e) || hemicube_init(&h, &g, &e)) {
+	if (!s || ff_hemicube_grid_init(&g, n, &e) || ff_hemicube_init(&h, &g, &e)) {
 		fprintf(stderr, "hemicube: %s\n", e.text);
 		exit(1);
 	}
 	for (size_t i = 0; i < repeats; i++) {
 		double eye[3], normal[3], frame[3][3];
-		uint32_t own = HEMI_VOID;
-		if (m->element_normal)
+		uint32_t own = HEMICUBE_VOID;
+		if (m->element.normal)
 			own = element_view(m, &r, eye, normal);
 		else
 			room_view(&r, i, eye, normal);
 		turn(normal, 7 * rng_uniform(&r), frame);
 		double t0 = seconds();
-		hemicube_render(&h, s, eye, (const double (*)[3])frame, own);
+		ff_hemicube_render(&h, s, eye, (const double (*)[3])frame, own);
 		double t1 = seconds();
-		escape += hemicube_gather(&h, f);
+		escape += ff_hemicube_sum(&h, f);
 		gather[i] = 1e3 * (seconds() - t1);
 		render[i] = 1e3 * (t1 - t0);
 	}
 	report("render_ms", name, n, render, repeats);
 	report("gather_ms", name, n, gather, repeats);
 	printf("escape.%s.%d %.3g\n", name, n, escape / (double)repeats);
-	hemicube_free(&h);
-	hemi_grid_free(&g);
-	hemi_scene_free(s);
+	ff_hemicube_free(&h);
+	ff_hemicube_grid_free(&g);
+	ff_hemicube_scene_free(s);
 	free(f);
 	free(gather);
 	free(render);
@@ -211,14 +211,14 @@ static int measure_file(const char *path, size_t repeats)
 	struct cache_info info = { 0 };
 	struct err e = { 0 };
 
-	if (mesh_file_read(path, &m, &info, &e)) {
+	if (file_mesh_read(path, &m, &info, &e)) {
 		fprintf(stderr, "hemicube: %s\n", e.text);
 		return 1;
 	}
-	printf("elements.file %zu\n", m.elements);
+	printf("elements.file %zu\n", m.element.n);
 	for (int n = 64; n <= 512; n *= 2)
 		measure("file", &m, n, repeats);
-	cache_info_free(&info);
+	file_cache_info_free(&info);
 	model_free(&m);
 	return 0;
 }
@@ -235,11 +235,11 @@ static void measure_rooms(size_t repeats)
 	for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
 		struct model m = room(scene[i].wall, scene[i].spheres, scene[i].rings,
 		                     scene[i].boxes, scene[i].grid);
-		printf("elements.%s %zu\n", scene[i].name, m.elements);
+		printf("elements.%s %zu\n", scene[i].name, m.element.n);
 		for (int n = 256; n <= 512; n *= 2)
 			measure(scene[i].name, &m, n, repeats);
 		free(m.vertex);
-		free(m.element);
+		free(m.element.corner);
 	}
 }
 

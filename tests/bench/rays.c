@@ -65,9 +65,9 @@ static void measure_extent(struct bench *b)
 
 	for (int k = 0; k < 3; k++)
 		lo[k] = INFINITY, hi[k] = -INFINITY;
-	for (size_t i = 0; i < 3 * b->m.triangles; i++)
+	for (size_t i = 0; i < 3 * b->m.triangle.n; i++)
 		for (int k = 0; k < 3; k++) {
-			double x = b->m.vertex[3 * (size_t)b->m.triangle[i] + (size_t)k];
+			double x = b->m.vertex[3 * (size_t)b->m.triangle.corner[i] + (size_t)k];
 			lo[k] = fmin(lo[k], x);
 			hi[k] = fmax(hi[k], x);
 		}
@@ -94,12 +94,12 @@ static int build(struct bench *b)
 	float *v = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
 	                                   3 * sizeof *v, b->m.vertices);
 	uint32_t *t = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-	                                      3 * sizeof *t, b->m.triangles);
+	                                      3 * sizeof *t, b->m.triangle.n);
 	if (!v || !t)
 		return -1;
 	for (size_t i = 0; i < b->m.vertices; i++)
 		to_unit(b, &b->m.vertex[3 * i], &v[3 * i]);
-	memcpy(t, b->m.triangle, 3 * b->m.triangles * sizeof *t);
+	memcpy(t, b->m.triangle.corner, 3 * b->m.triangle.n * sizeof *t);
 	rtcCommitGeometry(g);
 	rtcAttachGeometry(b->scene, g);
 	rtcReleaseGeometry(g);
@@ -121,10 +121,10 @@ static void store(struct bench *b, const double org[3], const double dir[3])
 /* The element of a patch that holds the part `area` of its area. */
 static uint32_t element_at(const struct model *m, size_t patch, double area)
 {
-	uint32_t e = m->patch_start[patch], last = m->patch_start[patch + 1] - 1;
+	uint32_t e = m->patch.start[patch], last = m->patch.start[patch + 1] - 1;
 
-	for (area *= m->patch_area[patch]; e < last && area >= m->element_area[e]; e++)
-		area -= m->element_area[e];
+	for (area *= m->patch.area[patch]; e < last && area >= m->element.area[e]; e++)
+		area -= m->element.area[e];
 	return e;
 }
 
@@ -139,10 +139,10 @@ static void side_rays(struct bench *b, size_t patch, int side, size_t count, uin
 		uint32_t e = element_at(m, patch, u[0]);
 		double r = sqrt(rng_sobol(i, 4, seed)), w[3] = { 1 - r, r * (1 - u[1]), r * u[1] };
 		for (size_t c = 0; c < 3; c++)
-			v3_mad(x, w[c], &m->vertex[3 * (size_t)m->element[3 * (size_t)e + c]], x);
+			v3_mad(x, w[c], &m->vertex[3 * (size_t)m->element.corner[3 * (size_t)e + c]], x);
 		for (size_t k = 0; k < 3; k++)
-			n[k] = (side ? -1 : 1) * m->element_normal[3 * (size_t)e + k];
-		lobe_sample_cosine(n, &u[2], dir);
+			n[k] = (side ? -1 : 1) * m->element.normal[3 * (size_t)e + k];
+		bsdf_sample_cosine(n, &u[2], dir);
 		v3_mad(x, 0x1p-21 * b->unit, n, x);
 		store(b, x, dir);
 	}
@@ -151,11 +151,11 @@ static void side_rays(struct bench *b, size_t patch, int side, size_t count, uin
 static int make_patch_rays(struct bench *b, size_t count, struct err *e)
 {
 	size_t sides = 0, used = 0, wanted = (count + SIDE_RAYS - 1) / SIDE_RAYS;
-	uint32_t *side = mem_new(2 * b->m.patches, sizeof *side, "patch-sides", e);
+	uint32_t *side = mem_new(2 * b->m.patch.n, sizeof *side, "patch-sides", e);
 
 	b->ray = mem_new(count, sizeof *b->ray, "rays", e);
 	if (side && b->ray) {
-		for (uint32_t ps = 0; ps < 2 * b->m.patches; ps++)
+		for (uint32_t ps = 0; ps < 2 * b->m.patch.n; ps++)
 			if (model_side_modelled(&b->m, ps))
 				side[sides++] = ps;
 		for (; b->rays < count; used++) {
@@ -173,13 +173,13 @@ static int make_camera_rays(struct bench *b, size_t count, const char *name, con
                             struct err *e)
 {
 	struct view_frame f;
-	int width, height, c = camera_find(&b->m, name, e);
+	int width, height, c = picture_camera_find(&b->m, name, e);
 
 	if (c < 0)
 		return -1;
-	if (camera_parse_size(size, &width, &height))
+	if (picture_camera_parse_size(size, &width, &height))
 		return err_set(e, "%s: not a picture size; give WxH", size);
-	if (camera_frame(&b->m.camera[c], width, height, &f, e))
+	if (picture_camera_frame(&b->m.camera[c], width, height, &f, e))
 		return -1;
 	size_t pixels = (size_t)f.width * (size_t)f.height, passes = (count + pixels - 1) / pixels;
 	b->ray = mem_new(passes * pixels, sizeof *b->ray, "rays", e);
@@ -193,7 +193,7 @@ static int make_camera_rays(struct bench *b, size_t count, const char *name, con
 					double org[3], dir[3];
 					if (i >= f.width || j >= f.height)
 						continue;
-					camera_ray(&f, i + .5, j + .5, org, dir);
+					picture_camera_ray(&f, i + .5, j + .5, org, dir);
 					store(b, org, dir);
 				}
 	return 0;
@@ -309,7 +309,7 @@ int main(int argc, char **argv)
 		fprintf(stderr, "usage: rays FILE.mesh COUNT THREADS [--camera NAME WxH]\n");
 		return 2;
 	}
-	if (!mesh_file_read(argv[1], &b.m, &info, &e)) {
+	if (!file_mesh_read(argv[1], &b.m, &info, &e)) {
 		measure_extent(&b);
 		bad = camera ? make_camera_rays(&b, (size_t)count, argv[5], argv[6], &e)
 		             : make_patch_rays(&b, (size_t)count, &e);
@@ -323,7 +323,7 @@ int main(int argc, char **argv)
 		rtcReleaseDevice(b.device);
 	free(b.ray);
 	free(b.buffer);
-	cache_info_free(&info);
+	file_cache_info_free(&info);
 	model_free(&b.m);
 	return bad ? 1 : 0;
 }

@@ -27,19 +27,19 @@ static int front(const struct facet *f, const struct facet *of, double near,
 {
 	double low, high;
 
-	facet_heights(f, of->normal, of->offset, &low, &high);
+	geo_facet_heights(f, of->normal, of->offset, &low, &high);
 	*out = *f;
 	if (high <= near)
 		return 0;
 	if (low >= -near)
 		return 1;
-	if (!facet_clip(f, of->normal, of->offset, room))
+	if (!geo_facet_clip(f, of->normal, of->offset, room))
 		return 0;
 	*out = room->f;
 	return 1;
 }
 
-static double brute(const struct model *m, struct brute *b, const struct body_set *bodies,
+static double brute(const struct model *m, struct brute *b, const struct occluder_set *bodies,
                     const double centre[3], const struct facet *f, const struct facet *g)
 {
 	struct facet_room room[2];
@@ -57,23 +57,23 @@ static void scene(uint64_t seed, int every, double tolerance)
 {
 	struct model m;
 	struct facet_set s;
-	struct body_set bodies;
+	struct occluder_set bodies;
 	struct err e = { 0 };
 	double centre[3];
 	struct exchanger x, y;
 	struct exchange_options o = { .relative = 1e-9, .absolute = tolerance, .most = 20000,
-	                              .bodies = SIGHT_BLOCKERS };
+	                              .bodies = SHAFT_OCCLUDERS };
 
-	if (random_scene(&m, seed) || facet_set_init(&s, &m, FACETS_OF_PATCHES, &e) ||
-	    body_set_init(&bodies, &m, &e)) {
+	if (random_scene(&m, seed) || occ_facet_set_init(&s, &m, FACETS_OF_PATCHES, &e) ||
+	    occ_occluder_set_init(&bodies, &m, &e)) {
 		printf("seed %lu: %s\n", (unsigned long)seed, e.text);
 		return;
 	}
-	facet_centre(&m, centre);
-	exchanger_init(&x, &o, &bodies, NULL, centre);
+	occ_facet_centre(&m, centre);
+	occ_exchanger_init(&x, &o, &bodies, NULL, centre);
 	o.absolute = 1e-8;
 	o.most = 20000;
-	exchanger_init(&y, &o, &bodies, NULL, centre);
+	occ_exchanger_init(&y, &o, &bodies, NULL, centre);
 	double begun = seconds(), worst_off = 0, fine_time = 0, brute_time = 0, main_time = 0;
 	int bad = 0, checked = 0;
 	double ratio = 0;
@@ -81,7 +81,7 @@ static void scene(uint64_t seed, int every, double tolerance)
 		for (uint32_t j = 0; j < i; j++) {
 			double off, off2, least = fmin(s.facet[i].area, s.facet[j].area);
 			double before = x.counts.partly, crowd = x.counts.crowded, t = seconds();
-			double a = exchange(&x, &s, i, &s, j, &off, &e);
+			double a = occ_exchange(&x, &s, i, &s, j, &off, &e);
 			double t2 = seconds() - t;
 			main_time += t2;
 			if (t2 > 1)
@@ -94,7 +94,7 @@ static void scene(uint64_t seed, int every, double tolerance)
 			double fine = a;
 			if (x.counts.partly > before) {
 				t = seconds();
-				fine = exchange(&y, &s, i, &s, j, &off2, &e);
+				fine = occ_exchange(&y, &s, i, &s, j, &off2, &e);
 				fine_time += seconds() - t;
 				double gap = fabs(a - fine);
 				suspect |= gap > 4 * (off + off2) + tolerance * least;
@@ -122,10 +122,10 @@ static void scene(uint64_t seed, int every, double tolerance)
 	       x.counts.evaluations / fmax(1, x.counts.partly), checked, bad, worst_off, ratio,
 	       seconds() - begun, main_time, fine_time, brute_time);
 	fflush(stdout);
-	exchanger_free(&x);
-	exchanger_free(&y);
-	facet_set_free(&s);
-	body_set_free(&bodies);
+	occ_exchanger_free(&x);
+	occ_exchanger_free(&y);
+	occ_facet_set_free(&s);
+	occ_occluder_set_free(&bodies);
 	model_free(&m);
 }
 
@@ -172,15 +172,15 @@ static void one(uint64_t seed, uint32_t i, uint32_t j)
 {
 	struct model m;
 	struct facet_set s;
-	struct body_set bodies;
+	struct occluder_set bodies;
 	struct err e = { 0 };
 	double centre[3], off, least;
-	struct sight_line l;
+	struct shaft l;
 
 	random_scene(&m, seed);
-	facet_set_init(&s, &m, FACETS_OF_PATCHES, &e);
-	body_set_init(&bodies, &m, &e);
-	facet_centre(&m, centre);
+	occ_facet_set_init(&s, &m, FACETS_OF_PATCHES, &e);
+	occ_occluder_set_init(&bodies, &m, &e);
+	occ_facet_centre(&m, centre);
 	const struct facet *f = &s.facet[i], *g = &s.facet[j];
 	least = fmin(f->area, g->area);
 	for (int k = 0; k < 2; k++) {
@@ -194,9 +194,9 @@ static void one(uint64_t seed, uint32_t i, uint32_t j)
 	struct facet a, c;
 	front(f, g, bodies.near, &room[0], &a);
 	front(g, f, bodies.near, &room[1], &c);
-	printf("sight %d, bodies", (int)sight_find(&l, &bodies, &a, &c));
+	printf("sight %d, bodies", (int)occ_shaft_cull(&l, &bodies, &a, &c));
 	for (int k = 0; k < l.bodies; k++) {
-		const struct body *o = &bodies.body[l.body[k]];
+		const struct occluder_body *o = &bodies.body[l.body[k]];
 		printf("\n  %s, %u corners:", o->flat ? "flat" : "solid", o->corners);
 		for (uint32_t q = 0; q < o->corners; q++)
 			printf(" (%.6f %.6f %.6f)", bodies.corner[3 * (o->corner + q)], bodies.corner[3 * (o->corner + q) + 1], bodies.corner[3 * (o->corner + q) + 2]);
@@ -205,10 +205,10 @@ static void one(uint64_t seed, uint32_t i, uint32_t j)
 	for (double t = 1e-3; t > 5e-10; t /= 10) {
 		struct exchanger x;
 		struct exchange_options o = { .relative = 1e-9, .absolute = t, .most = 200000 };
-		exchanger_init(&x, &o, &bodies, NULL, centre);
-		double v = exchange(&x, &s, i, &s, j, &off, &e), w = exchange(&x, &s, j, &s, i, &off, &e);
+		occ_exchanger_init(&x, &o, &bodies, NULL, centre);
+		double v = occ_exchange(&x, &s, i, &s, j, &off, &e), w = occ_exchange(&x, &s, j, &s, i, &off, &e);
 		printf("t %.0e: %.10g %.10g stated %.2g, %.0f evaluations\n", t, v / least, w / least, off / least, x.counts.evaluations);
-		exchanger_free(&x);
+		occ_exchanger_free(&x);
 	}
 	brute_begin(&b, &m, centre, &a, &c, bodies.near);
 	for (double t = 1e-3; t > 5e-8; t /= 10) {

@@ -24,7 +24,7 @@ static void assert_near(double got, double expected, double tolerance)
 struct lab {
 	struct model m;
 	struct facet_set s;
-	struct body_set bodies;
+	struct occluder_set bodies;
 	double centre[3];
 	struct exchanger x;
 };
@@ -33,23 +33,23 @@ static void ready(struct lab *l, double absolute)
 {
 	struct err e = { 0 };
 	struct exchange_options o = { .relative = 1e-9, .absolute = absolute, .most = 50000,
-	                              .bodies = SIGHT_BLOCKERS };
+	                              .bodies = SHAFT_OCCLUDERS };
 
-	assert_int_equal(facet_set_init(&l->s, &l->m, FACETS_OF_PATCHES, &e), 0);
-	assert_int_equal(body_set_init(&l->bodies, &l->m, &e), 0);
-	facet_centre(&l->m, l->centre);
-	exchanger_init(&l->x, &o, &l->bodies, NULL, l->centre);
+	assert_int_equal(occ_facet_set_init(&l->s, &l->m, FACETS_OF_PATCHES, &e), 0);
+	assert_int_equal(occ_occluder_set_init(&l->bodies, &l->m, &e), 0);
+	occ_facet_centre(&l->m, l->centre);
+	occ_exchanger_init(&l->x, &o, &l->bodies, NULL, l->centre);
 }
 
 static void finish(struct lab *l)
 {
-	exchanger_free(&l->x);
-	facet_set_free(&l->s);
-	body_set_free(&l->bodies);
+	occ_exchanger_free(&l->x);
+	occ_facet_set_free(&l->s);
+	occ_occluder_set_free(&l->bodies);
 	model_free(&l->m);
 }
 
-static size_t flats(const struct body_set *s)
+static size_t flats(const struct occluder_set *s)
 {
 	size_t n = 0;
 
@@ -137,7 +137,7 @@ static void test_not_convex(void **state)
 	assert_int_equal(scene_end(&l.m), 0);
 	ready(&l, 1e-6);
 	for (size_t i = 0; i < l.bodies.bodies; i++) {
-		const struct body *b = &l.bodies.body[i];
+		const struct occluder_body *b = &l.bodies.body[i];
 		/* No body holds the notch. */
 		int holds = !b->flat;
 		for (uint32_t f = 0; holds && f < b->faces; f++) {
@@ -168,7 +168,7 @@ static void test_sharing(void **state)
 	assert_int_equal(scene_end(&l.m), 0);
 	ready(&l, 1e-6);
 	uint32_t n = (uint32_t)l.s.facets;
-	assert_near(exchange(&l.x, &l.s, n - 1, &l.s, n - 2, &off, &e), 0, 1e-6);
+	assert_near(occ_exchange(&l.x, &l.s, n - 1, &l.s, n - 2, &off, &e), 0, 1e-6);
 	finish(&l);
 }
 
@@ -191,7 +191,7 @@ static void test_t_junctions(void **state)
 	assert_int_equal(scene_end(&l.m), 0);
 	ready(&l, 1e-6);
 	uint32_t n = (uint32_t)l.s.facets;
-	assert_near(exchange(&l.x, &l.s, n - 1, &l.s, n - 2, &off, &e), 0, 4e-6);
+	assert_near(occ_exchange(&l.x, &l.s, n - 1, &l.s, n - 2, &off, &e), 0, 4e-6);
 	finish(&l);
 }
 
@@ -211,7 +211,7 @@ static void test_inside(void **state)
 		/* The back of its first face: two faces before are the room's. */
 		uint32_t back = l.s.start[2 * 6 + 1];
 		for (uint32_t i = 0; i < l.s.facets; i++)
-			sum += i == back ? 0 : exchange(&l.x, &l.s, back, &l.s, i, &off, &e);
+			sum += i == back ? 0 : occ_exchange(&l.x, &l.s, back, &l.s, i, &off, &e);
 		assert_near(sum, 1, 1e-5);
 		finish(&l);
 	}
@@ -244,7 +244,7 @@ static void check_cone(int sides, size_t bodies, size_t flat)
 	assert_int_equal(flats(&l.bodies), flat);
 	uint32_t last = (uint32_t)l.s.facets - 1;
 	for (uint32_t i = 0; i < last; i++)
-		sum += exchange(&l.x, &l.s, last, &l.s, i, &off, &e);
+		sum += occ_exchange(&l.x, &l.s, last, &l.s, i, &off, &e);
 	assert_false(e.set);
 	assert_near(sum, l.s.facet[last].area, .03 * l.s.facet[last].area);
 	finish(&l);
@@ -261,10 +261,10 @@ static void test_cone(void **state)
 /* ---- sights ---- */
 
 /* Of two unit squares, past a beam between them from x = at. */
-static enum sight look(int solid, double at, double side)
+static enum shaft_state look(int solid, double at, double side)
 {
 	struct lab l = { 0 };
-	struct sight_line s = { .most = SIGHT_BLOCKERS };
+	struct shaft s = { .most = SHAFT_OCCLUDERS };
 
 	far_room(&l.m, 1);
 	scene_quad(&l.m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 }, (double[]){ 1, 1, 0 },
@@ -277,7 +277,7 @@ static enum sight look(int solid, double at, double side)
 		scene_grid(&l.m, (double[]){ at, -.5, 1 }, (double[]){ side, 0, 0 }, (double[]){ 0, 2, 0 }, 1);
 	assert_int_equal(scene_end(&l.m), 0);
 	ready(&l, 1e-6);
-	enum sight found = sight_find(&s, &l.bodies, &l.s.facet[6], &l.s.facet[7]);
+	enum shaft_state found = occ_shaft_cull(&s, &l.bodies, &l.s.facet[6], &l.s.facet[7]);
 	finish(&l);
 	return found;
 }
@@ -286,13 +286,13 @@ static void test_sight(void **state)
 {
 	(void)state;
 	for (int solid = 0; solid < 2; solid++) {
-		assert_int_equal(look(solid, 1, 1), SIGHT_CLEAR);       /* touches the shaft */
-		assert_int_equal(look(solid, 2, 1), SIGHT_CLEAR);
-		assert_int_equal(look(solid, .9, 1), SIGHT_PART);
-		assert_int_equal(look(solid, .4, .01), SIGHT_PART);
-		assert_int_equal(look(solid, -.2, 1), SIGHT_PART);
-		assert_int_equal(look(solid, -.5, 2), SIGHT_NONE);
-		assert_int_equal(look(solid, -2, 6), SIGHT_NONE);
+		assert_int_equal(look(solid, 1, 1), SHAFT_CLEAR);       /* touches the shaft */
+		assert_int_equal(look(solid, 2, 1), SHAFT_CLEAR);
+		assert_int_equal(look(solid, .9, 1), SHAFT_PARTLY);
+		assert_int_equal(look(solid, .4, .01), SHAFT_PARTLY);
+		assert_int_equal(look(solid, -.2, 1), SHAFT_PARTLY);
+		assert_int_equal(look(solid, -.5, 2), SHAFT_HIDDEN);
+		assert_int_equal(look(solid, -2, 6), SHAFT_HIDDEN);
 	}
 }
 
@@ -306,17 +306,17 @@ static int in_front(const struct facet *f, const struct facet *of, double near,
 {
 	double low, high;
 
-	facet_heights(f, of->normal, of->offset, &low, &high);
+	geo_facet_heights(f, of->normal, of->offset, &low, &high);
 	*out = *f;
 	if (high <= near || low >= -near)
 		return high > near;
-	if (!facet_clip(f, of->normal, of->offset, room))
+	if (!geo_facet_clip(f, of->normal, of->offset, room))
 		return 0;
 	*out = room->f;
 	return 1;
 }
 
-/* What points see, for all pairs of random scenes: sight_find, blocker_make and seen. */
+/* What points see, for all pairs of random scenes: occ_shaft_cull, occ_occluder_make and seen. */
 static void test_seen(void **state)
 {
 	(void)state;
@@ -324,24 +324,24 @@ static void test_seen(void **state)
 		struct lab l = { 0 };
 		struct dice d = { seed, 1000 };
 		struct err e = { 0 };
-		static struct seer seer;
+		static struct visible_point seer;
 		assert_int_equal(random_scene(&l.m, seed), 0);
 		ready(&l, 1e-6);
 		const double near = l.bodies.near;
 		for (int pair = 0; pair < 300; pair++) {
 			struct facet_room room[2];
 			struct facet f, g;
-			struct sight_line s = { .most = SIGHT_BLOCKERS };
+			struct shaft s = { .most = SHAFT_OCCLUDERS };
 			const struct facet *a = &l.s.facet[roll_int(&d, 0, (int)l.s.facets - 1)];
 			const struct facet *b = &l.s.facet[roll_int(&d, 0, (int)l.s.facets - 1)];
 			if (a == b || !in_front(a, b, near, &room[0], &f) ||
 			    !in_front(b, a, near, &room[1], &g))
 				continue;
-			enum sight sight = sight_find(&s, &l.bodies, &f, &g);
+			enum shaft_state sight = occ_shaft_cull(&s, &l.bodies, &f, &g);
 			int blockers = 0;
-			for (int i = 0; sight == SIGHT_PART && i < s.bodies; i++)
-				blockers += blocker_make(&l.bodies, s.body[i], &g, &seer.blocker[blockers]);
-			seer_begin(&seer, blockers, near);
+			for (int i = 0; sight == SHAFT_PARTLY && i < s.bodies; i++)
+				blockers += occ_occluder_make(&l.bodies, s.body[i], &g, &seer.occluder[blockers]);
+			occ_visible_begin(&seer, blockers, near);
 			brute_begin(&brute, &l.m, l.centre, &f, &g, near);
 			for (int k = 0; k < 4; k++) {
 				double x[3], u = sqrt(roll(&d, 0, 1)), w = roll(&d, 0, 1);
@@ -349,8 +349,8 @@ static void test_seen(void **state)
 				for (int i = 0; i < 3; i++)
 					x[i] = (1 - u) * f.v[i] + u * ((1 - w) * f.v[3 * c + i] + w * f.v[3 * c + 3 + i]);
 				double exact = brute_point(&brute, x), got = 0;
-				if (sight != SIGHT_NONE)
-					got = seen(&seer, x, f.normal, &g, blockers ? UINT64_MAX >> (64 - blockers) : 0, &e);
+				if (sight != SHAFT_HIDDEN)
+					got = occ_visible_exchange(&seer, x, f.normal, &g, blockers ? UINT64_MAX >> (64 - blockers) : 0, &e);
 				if (!(fabs(got - exact) <= 2e-6))
 					fail_msg("seed %d, facets %d and %d: %.12g, brute %.12g (sight %d)", (int)seed,
 					         (int)(a - l.s.facet), (int)(b - l.s.facet), got, exact, (int)sight);
@@ -386,11 +386,11 @@ static void test_exchange(void **state)
 		assert_int_equal(scene_end(&l.m), 0);
 		ready(&l, 1e-6);
 		uint32_t a = l.s.start[2 * 6], b = l.s.start[2 * 7];
-		double got = exchange(&l.x, &l.s, a, &l.s, b, &off, &e);
+		double got = occ_exchange(&l.x, &l.s, a, &l.s, b, &off, &e);
 		brute_begin(&brute, &l.m, l.centre, &l.s.facet[a], &l.s.facet[b], l.bodies.near);
 		assert_near(got, brute_exchange(&brute, 1e-4, 3), 4e-6);
 		assert_true(off <= 1.2e-6);
-		double back = exchange(&l.x, &l.s, b, &l.s, a, &off, &e);
+		double back = occ_exchange(&l.x, &l.s, b, &l.s, a, &off, &e);
 		assert_near(back, got, 4e-6);
 		finish(&l);
 	}

@@ -26,7 +26,7 @@ static void begin(struct model *m, int bands, enum lobe_kind kind)
 	struct err e = { 0 };
 
 	*m = (struct model){ .bands = bands, .lobe = kind };
-	assert_int_equal(materials_new(&m->material, 1, bands, &e), 0);
+	assert_int_equal(model_materials_new(&m->material, 1, bands, &e), 0);
 }
 
 /* The direction at polar angle theta and azimuth phi about n. */
@@ -70,7 +70,7 @@ static void lobe_setup(struct lobe_case *c, double degrees)
 		mt->alpha[s] = mt->beta[s] = c->k;
 	}
 	direction(degrees * pi / 180, 1, c->known);
-	lobe_mirror(c->known, n, c->axis);
+	bsdf_lobe_mirror(c->known, n, c->axis);
 	for (int i = 0; i < 3; i++) {
 		c->side[i] = c->transmitted ? -n[i] : n[i];
 		if (c->transmitted)
@@ -93,7 +93,7 @@ static int find_bin(const struct lobe_case *c, const double w[3])
 	double t[3], b[3];
 
 	v3_frame(c->axis, t, b);
-	double v = lobe_power(c->k + 1, v3_dot(c->axis, w));
+	double v = bsdf_lobe_power(c->k + 1, v3_dot(c->axis, w));
 	double phi = atan2(v3_dot(b, w), v3_dot(t, w)) / (2 * pi);
 	int ring = (int)fmin(v * RINGS, RINGS - 1);
 	int sector = (int)fmin((phi < 0 ? phi + 1 : phi) * SECTORS, SECTORS - 1);
@@ -195,7 +195,7 @@ static void test_chi_square_of_lobes(void **state)
 				         c.transport == BSDF_FROM_EYE ? "eye" : "light", z);
 			worst = fmax(worst, z);
 		}
-		materials_free(&m.material);
+		model_materials_free(&m.material);
 	}
 	assert_int_equal(cases, 280);
 	assert_true(worst > 1.5); /* a statistic that never moves is no test */
@@ -375,7 +375,7 @@ static void test_mixed_materials(void **state)
 				check_mixed(&m, degrees[i], BSDF_FROM_LIGHT, seed++);
 				check_mixed(&m, degrees[i], BSDF_FROM_EYE, seed++);
 			}
-			materials_free(&m.material);
+			model_materials_free(&m.material);
 		}
 }
 
@@ -409,7 +409,7 @@ static void test_reciprocity_ratio_table(void **state)
 			bsdf_eval(&m, 0, n, b, a, &ba);
 			assert_true(fabs(ab / ba / table[i].ratio[j] - 1) < 1e-12);
 		}
-	materials_free(&m.material);
+	model_materials_free(&m.material);
 }
 
 /* The paper's lobe of exponent 1 for light along the normal is diffuse, to rounding. */
@@ -429,7 +429,7 @@ static void test_exponent_one_is_diffuse(void **state)
 		bsdf_eval(&m, 0, n, from, to, &f);
 		assert_true(fabs(f * pi / .6 - 1) < 1e-12);
 	}
-	materials_free(&m.material);
+	model_materials_free(&m.material);
 }
 
 static void test_reciprocal_lobe(void **state)
@@ -451,7 +451,7 @@ static void test_reciprocal_lobe(void **state)
 		bsdf_eval(&m, 0, n, b, a, &ba);
 		assert_true(fabs(ab - ba) <= 1e-12 * ab);
 	}
-	materials_free(&m.material);
+	model_materials_free(&m.material);
 }
 
 static void test_reciprocal_albedo(void **state)
@@ -475,10 +475,10 @@ static void test_reciprocal_albedo(void **state)
 			mean += s.weight[0] / N;
 			square += s.weight[0] * s.weight[0] / N;
 		}
-		assert_true(fabs(mean - .8 * lobe_albedo(20, cos(deg * pi / 180))) <
+		assert_true(fabs(mean - .8 * bsdf_lobe_albedo(20, cos(deg * pi / 180))) <
 		            4 * sqrt((square - mean * mean) / N));
 	}
-	materials_free(&m.material);
+	model_materials_free(&m.material);
 }
 
 /* ---- sides ---- */
@@ -516,8 +516,8 @@ static void test_flipped_winding(void **state)
 		bsdf_sample(&turned, 0, other, a, BSDF_FROM_EYE, u, &t);
 		assert_int_equal(s.event, t.event);
 	}
-	materials_free(&m.material);
-	materials_free(&turned.material);
+	model_materials_free(&m.material);
+	model_materials_free(&turned.material);
 }
 
 static void test_one_sided(void **state)
@@ -540,7 +540,7 @@ static void test_one_sided(void **state)
 	assert_true(f[0] == 0 && bsdf_exitance(&m.material, 0, BACK, 0) == 0);
 	assert_true(bsdf_albedo(&m.material, 0, BACK, 0) == 0);
 	assert_true(!bsdf_has_lobe(&m.material, 0, BACK, 0) && bsdf_has_lobe(&m.material, 0, FRONT, 0));
-	materials_free(&m.material);
+	model_materials_free(&m.material);
 }
 
 static void test_ideal(void **state)
@@ -566,7 +566,7 @@ static void test_ideal(void **state)
 	assert_true(s.event == BSDF_IDEAL_R && fabs(s.weight[0] - .6) < 1e-15);
 	bsdf_eval(&m, 0, n, known, s.w, &f);
 	assert_true(f == 0 && bsdf_pdf(&m, 0, n, known, BSDF_FROM_LIGHT, s.w) == 0);
-	materials_free(&m.material);
+	model_materials_free(&m.material);
 }
 
 /* ---- grazing ---- */
@@ -609,7 +609,7 @@ static void test_grazing(void **state)
 				known[2] = -known[2];
 				check_grazing(&m, known, up, &r);
 			}
-			materials_free(&m.material);
+			model_materials_free(&m.material);
 		}
 }
 
@@ -637,7 +637,7 @@ static void test_emission(void **state)
 		bsdf_emission(&m, 0, n, w, &l);
 		assert_true(l == 0 && bsdf_exitance(&m.material, 0, FRONT, 0) == 0);
 	}
-	materials_free(&m.material);
+	model_materials_free(&m.material);
 }
 
 int main(void)

@@ -62,59 +62,59 @@ static void write_mesh(void)
 {
 	struct err e = { 0 };
 
-	must(mesh_file_write(mesh_path, &model, &info, &e), &e);
+	must(file_mesh_write(mesh_path, &model, &info, &e), &e);
 }
 
 static void write_rad(void)
 {
 	struct err e = { 0 };
 
-	must(rad_file_write(rad_path, &model, &solution, &info, &e), &e);
+	must(file_rad_write(rad_path, &model, &solution, &info, &e), &e);
 }
 
 /* In two batches: rows of patch 0, then the row of patch 1. */
 static int try_write_ff(const struct ff *f, int to_patches, struct err *e)
 {
 	const uint64_t blocks[] = { 0, 1 }, entries[] = { 0, 3 }, arrivals[] = { 0, 0 };
-	struct ff_writer *w = ff_file_create(ff_path, &model, 0, to_patches, e);
+	struct ff_writer *w = file_ff_create(ff_path, &model, 0, to_patches, e);
 
 	if (!w)
 		return -1;
 	struct ff first = *f, second = *f;
-	first.rows = 2, first.blocks = 3, first.entries = 3, first.links = 0;
-	second.rows = 1, second.blocks = 1, second.entries = 3;
-	second.arrivals = second.links = 0;
-	second.row_side += 2, second.row_kind += 2, second.row_samples += 2;
-	second.row_scale += 2, second.row_residual += 2, second.row_error += 2;
-	second.row_block = (uint64_t *)blocks;
-	second.block_chain += 3, second.block_escape += 3, second.block_black += 3;
-	second.block_lost += 3, second.block_cut += 3;
-	second.block_start = (uint64_t *)entries;
-	second.block_arrival = (uint64_t *)arrivals;
+	first.row.n = 2, first.block.n = 3, first.entries = 3, first.link.n = 0;
+	second.row.n = 1, second.block.n = 1, second.entries = 3;
+	second.arrival.n = second.link.n = 0;
+	second.row.side += 2, second.row.kind += 2, second.row.samples += 2;
+	second.row.scale += 2, second.row.residual += 2, second.row.error += 2;
+	second.row.block = (uint64_t *)blocks;
+	second.block.chain += 3, second.block.escape += 3, second.block.black += 3;
+	second.block.lost += 3, second.block.cut += 3;
+	second.block.start = (uint64_t *)entries;
+	second.block.arrival = (uint64_t *)arrivals;
 	second.column += 3, second.value += 3;
-	if (ff_file_append(w, &first, e) || ff_file_append(w, &second, e)) {
-		ff_file_abandon(w);
+	if (file_ff_append(w, &first, e) || file_ff_append(w, &second, e)) {
+		file_ff_abandon(w);
 		return -1;
 	}
 	/* The lobe row comes in a batch of its own with the link to it. */
 	const uint64_t last_entries[] = { 0, 1 };
 	const uint32_t link_row[] = { 0, FF_NO_ROW };
 	struct ff third = *f;
-	third.rows = 1, third.blocks = 1, third.entries = 1, third.arrivals = 0;
-	third.row_side += 3, third.row_kind += 3, third.row_samples += 3;
-	third.row_scale += 3, third.row_residual += 3, third.row_error += 3;
-	third.row_block = (uint64_t *)blocks;
-	third.block_chain += 4, third.block_escape += 4, third.block_black += 4;
-	third.block_lost += 4, third.block_cut += 4;
-	third.block_start = (uint64_t *)last_entries;
-	third.block_arrival = (uint64_t *)arrivals;
+	third.row.n = 1, third.block.n = 1, third.entries = 1, third.arrival.n = 0;
+	third.row.side += 3, third.row.kind += 3, third.row.samples += 3;
+	third.row.scale += 3, third.row.residual += 3, third.row.error += 3;
+	third.row.block = (uint64_t *)blocks;
+	third.block.chain += 4, third.block.escape += 4, third.block.black += 4;
+	third.block.lost += 4, third.block.cut += 4;
+	third.block.start = (uint64_t *)last_entries;
+	third.block.arrival = (uint64_t *)arrivals;
 	third.column += 6, third.value += 6;
-	third.link_row = (uint32_t *)link_row;
-	if (ff_file_append(w, &third, e)) {
-		ff_file_abandon(w);
+	third.link.row = (uint32_t *)link_row;
+	if (file_ff_append(w, &third, e)) {
+		file_ff_abandon(w);
 		return -1;
 	}
-	return ff_file_finish(w, f, &info, e);
+	return file_ff_finish(w, f, &info, e);
 }
 
 static void write_ff(void)
@@ -141,10 +141,10 @@ static void check_model(const struct model *m)
 	SAME(m->material.emission, model.material.emission, 12);
 	SAME(m->vertex, model.vertex, 15);
 	SAME(m->split, model.split, 1);
-	SAME(m->element, model.element, 9);
-	SAME(m->patch_loop, model.patch_loop, 3);
-	SAME(m->loop_index, model.loop_index, 4);
-	SAME(m->patch_area, model.patch_area, 2);
+	SAME(m->element.corner, model.element.corner, 9);
+	SAME(m->patch.loop, model.patch.loop, 3);
+	SAME(m->patch.loop_index, model.patch.loop_index, 4);
+	SAME(m->patch.area, model.patch.area, 2);
 	assert_int_equal(m->cameras, 2);
 	assert_string_equal(m->camera[1].name, "far");
 	assert_int_equal(m->camera[1].orthographic, 1);
@@ -159,13 +159,13 @@ static void test_mesh(void **state)
 
 	(void)state;
 	write_mesh();
-	must(mesh_file_read(mesh_path, &m, &i, &e), &e);
+	must(file_mesh_read(mesh_path, &m, &i, &e), &e);
 	check_model(&m);
 	assert_string_equal(i.history, info.history);
 	assert_string_equal(i.report, info.report);
 	assert_int_equal(strlen(i.geometry_id), 32);
 	model_free(&m);
-	cache_info_free(&i);
+	file_cache_info_free(&i);
 }
 
 static void test_rad(void **state)
@@ -177,20 +177,20 @@ static void test_rad(void **state)
 
 	(void)state;
 	write_rad();
-	must(rad_file_read(rad_path, &m, &s, &i, &e), &e);
+	must(file_rad_read(rad_path, &m, &s, &i, &e), &e);
 	check_model(&m);
 	assert_int_equal(s.shots, 42);
 	assert_int_equal(s.links, 1);
-	SAME(s.direct, solution.direct, 18);
-	SAME(s.error, solution.error, 18);
-	SAME(s.error_direct, solution.error_direct, 18);
-	SAME(s.discretisation_direct, solution.discretisation_direct, 18);
-	SAME(s.discretisation, solution.discretisation, 18);
-	SAME(s.unshot_link, solution.unshot_link, 6);
+	SAME(s.irradiance.direct, solution.irradiance.direct, 18);
+	SAME(s.error.sampling, solution.error.sampling, 18);
+	SAME(s.error.sampling_direct, solution.error.sampling_direct, 18);
+	SAME(s.error.discretisation_direct, solution.error.discretisation_direct, 18);
+	SAME(s.error.discretisation, solution.error.discretisation, 18);
+	SAME(s.unshot.link, solution.unshot.link, 6);
 	SAME(s.ledger, solution.ledger, LEDGER_TERMS * 3);
 	model_free(&m);
 	solution_free(&s);
-	cache_info_free(&i);
+	file_cache_info_free(&i);
 }
 
 static void test_ff(void **state)
@@ -201,29 +201,29 @@ static void test_ff(void **state)
 
 	(void)state;
 	write_ff();
-	cache_ids(&model, &ids);
-	must(ff_file_open(ff_path, &model, &ids, &f, &e), &e);
-	assert_int_equal(f.f.rows, ff.rows);
-	SAME(f.f.row_block, ff.row_block, 5);
-	SAME(f.f.block_start, ff.block_start, 6);
+	file_cache_ids(&model, &ids);
+	must(file_ff_open(ff_path, &model, &ids, &f, &e), &e);
+	assert_int_equal(f.f.row.n, ff.row.n);
+	SAME(f.f.row.block, ff.row.block, 5);
+	SAME(f.f.block.start, ff.block.start, 6);
 	const uint64_t words[] = { 2 * 0, 2 * 2, 2 * 3, 2 * 3 + 1, 2 * 5 };
 	const uint16_t column[] = { 1, 4, 4, 0, 3, 4 }; /* the fourth block is a span */
-	SAME(f.f.block_column, words, 5);
+	SAME(f.f.block.column, words, 5);
 	SAME(f.f.column16, column, 6);
 	assert_true(f.f.columns == 6 && !f.f.to_patches && !f.f.column);
 	assert_true(ff_has_spans(&f.f, 3) && !ff_has_spans(&f.f, 0));
 	SAME(f.f.value, ff.value, 7);
 	assert_null(f.f.value64);
-	SAME(f.f.block_escape, ff.block_escape, 5);
-	SAME(f.f.link_row, ff.link_row, 2);
-	SAME(f.f.chain_start, ff.chain_start, 3);
+	SAME(f.f.block.escape, ff.block.escape, 5);
+	SAME(f.f.link.row, ff.link.row, 2);
+	SAME(f.f.chain.start, ff.chain.start, 3);
 	assert_int_equal(f.f.patch_end, 2);
 	assert_int_equal(f.patches, 2);
 	assert_string_equal(f.surface_name[f.patch_surface[1]], "Lämpchen");
 	assert_int_equal(f.scene.patch_sides[0], 3);
 	assert_int_equal(f.scene.patch_sides[1], 1);
-	SAME(f.scene.patch_area, model.patch_area, 2);
-	ff_file_close(&f);
+	SAME(f.scene.patch_area, model.patch.area, 2);
+	file_ff_close(&f);
 }
 
 /* What a block holds, whatever its words are. */
@@ -249,15 +249,15 @@ static void test_lists_and_spans(void **state)
 
 	(void)state;
 	write_ff();
-	must(ff_file_open(ff_path, &model, NULL, &f, &e), &e);
-	for (uint64_t b = 0; b < ff.blocks; b++) {
-		const uint64_t *start = ff.block_start + b;
+	must(file_ff_open(ff_path, &model, NULL, &f, &e), &e);
+	for (uint64_t b = 0; b < ff.block.n; b++) {
+		const uint64_t *start = ff.block.start + b;
 		expect_block(&ff, b, ff.column + start[0], ff.value + start[0],
 		             (uint32_t)(start[1] - start[0]));
 		expect_block(&f.f, b, ff.column + start[0], ff.value + start[0],
 		             (uint32_t)(start[1] - start[0]));
 	}
-	ff_file_close(&f);
+	file_ff_close(&f);
 }
 
 /* Elements 0 and 1 are patch 0, element 2 is patch 1. */
@@ -270,12 +270,12 @@ static void test_ff_to_patches(void **state)
 
 	(void)state;
 	must(try_write_ff(&ff, 1, &e), &e);
-	must(ff_file_open(ff_path, &model, NULL, &f, &e), &e);
+	must(file_ff_open(ff_path, &model, NULL, &f, &e), &e);
 	assert_int_equal(f.f.to_patches, 1);
 	assert_int_equal(f.f.entries, 6);
 	expect_block(&f.f, 0, one, same, 2);
 	expect_block(&f.f, 3, sum, summed, 2);
-	ff_file_close(&f);
+	file_ff_close(&f);
 }
 
 static void test_ff_of_another_geometry(void **state)
@@ -287,9 +287,9 @@ static void test_ff_of_another_geometry(void **state)
 	(void)state;
 	write_ff();
 	model.vertex[0] = 1e-9;
-	cache_ids(&model, &ids);
+	file_cache_ids(&model, &ids);
 	model.vertex[0] = 0;
-	assert_int_equal(ff_file_open(ff_path, &model, &ids, &f, &e), -1);
+	assert_int_equal(file_ff_open(ff_path, &model, &ids, &f, &e), -1);
 	assert_non_null(strstr(e.text, "a.ff: made for another geometry; run ffcalc again"));
 }
 
@@ -300,7 +300,7 @@ static void ids_after(double *where, double value, struct cache_info *i)
 	double old = *where;
 
 	*where = value;
-	cache_ids(&model, i);
+	file_cache_ids(&model, i);
 	*where = old;
 }
 
@@ -309,7 +309,7 @@ static void test_ids(void **state)
 	struct cache_info a = { 0 }, b = { 0 };
 
 	(void)state;
-	cache_ids(&model, &a);
+	file_cache_ids(&model, &a);
 	ids_after(&model.material.rho_d[0], .4, &b); /* repainted */
 	assert_string_equal(a.geometry_id, b.geometry_id);
 	assert_string_not_equal(a.material_id, b.material_id);
@@ -324,7 +324,7 @@ static void test_ids(void **state)
 	assert_string_equal(a.material_id, b.material_id);
 	assert_string_not_equal(a.camera_id, b.camera_id);
 	model.lobe = LOBE_RECIPROCAL;
-	cache_ids(&model, &b);
+	file_cache_ids(&model, &b);
 	model.lobe = LOBE_PAPER;
 	assert_string_not_equal(a.geometry_id, b.geometry_id);
 }
@@ -392,27 +392,27 @@ static void test_refused_models(void **state)
 	refuse_double(&model.camera[1].xmag, 0, "camera_xmag, camera_ymag: camera 'far'");
 	refuse_double(&model.camera[0].to_world[0], 2, "array camera_to_world: camera 'near'");
 	refuse_double(&model.camera[0].to_world[12], (double)NAN, "array camera_to_world");
-	refuse_uint(&model.triangle[5], 5, "array triangle: value 5 is 5, which must be below 5");
-	refuse_uint(&model.element[0], 99, "array element: value 0 is 99");
-	refuse_uint(&model.element[0], 4, "array element: element 0 has area 0");
+	refuse_uint(&model.triangle.corner[5], 5, "array triangle: value 5 is 5, which must be below 5");
+	refuse_uint(&model.element.corner[0], 99, "array element: value 0 is 99");
+	refuse_uint(&model.element.corner[0], 4, "array element: element 0 has area 0");
 	refuse_uint(&model.surface.material[0], 2, "array surface_material");
-	refuse_uint(&model.triangle_surface[1], 2, "array triangle_surface");
-	refuse_uint(&model.triangle_surface[1], 0, "patch 1 holds element 2 of another surface");
-	refuse_uint(&model.element_triangle[0], 1, "array element_triangle: the tree of");
-	refuse_uint(&model.patch_start[1], 3, "array patch_start: patch 1 has no elements");
-	refuse_uint(&model.patch_start[1], 4000000000u, "array patch_start: patch");
-	refuse_uint(&model.patch_start[2], 2, "array patch_start: it runs from 0 to 2");
-	refuse_uint(&model.patch_surface[0], 7, "array patch_surface");
-	refuse_uint(&model.loop_index[3], 5, "array loop_index");
-	refuse_int(&model.triangle_split[0], 1, "leads to split 1 of 1");
-	refuse_int(&model.triangle_split[1], ~3, "leads to element 3 of 3");
-	refuse_int(&model.triangle_split[1], ~0, "element 0 is reached twice");
-	refuse_int(&model.triangle_split[1], INT32_MIN, "leads to element 2147483647");
+	refuse_uint(&model.triangle.surface[1], 2, "array triangle_surface");
+	refuse_uint(&model.triangle.surface[1], 0, "patch 1 holds element 2 of another surface");
+	refuse_uint(&model.element.triangle[0], 1, "array element_triangle: the tree of");
+	refuse_uint(&model.patch.start[1], 3, "array patch_start: patch 1 has no elements");
+	refuse_uint(&model.patch.start[1], 4000000000u, "array patch_start: patch");
+	refuse_uint(&model.patch.start[2], 2, "array patch_start: it runs from 0 to 2");
+	refuse_uint(&model.patch.surface[0], 7, "array patch_surface");
+	refuse_uint(&model.patch.loop_index[3], 5, "array loop_index");
+	refuse_int(&model.triangle.split[0], 1, "leads to split 1 of 1");
+	refuse_int(&model.triangle.split[1], ~3, "leads to element 3 of 3");
+	refuse_int(&model.triangle.split[1], ~0, "element 0 is reached twice");
+	refuse_int(&model.triangle.split[1], INT32_MIN, "leads to element 2147483647");
 	refuse_int(&model.split[0].child[0], 0, "split 0 is reached twice");
 	refuse_int(&model.split[0].edge, 3, "split 0 has edge 3");
-	model.loop_start[1] = 2;
+	model.patch.loop_start[1] = 2;
 	refuse_model("array loop_start: it runs from 0 to 2");
-	model.loop_start[1] = 4;
+	model.patch.loop_start[1] = 4;
 	char *name = model.surface.name[0];
 	model.surface.name[0] = model.surface.name[1];
 	refuse_model("names of surfaces: 'Lämpchen' is there twice");
@@ -428,15 +428,15 @@ static void test_bad_model_is_not_written(void **state)
 	write_mesh();
 	assert_int_equal(stat(mesh_path, &before), 0);
 	model.vertex[0] = (double)NAN;
-	assert_int_equal(mesh_file_write(mesh_path, &model, &info, &e), -1);
+	assert_int_equal(file_mesh_write(mesh_path, &model, &info, &e), -1);
 	model.vertex[0] = 0;
 	assert_non_null(strstr(e.text, "a.mesh: cannot write: array vertex: value 0 is nan"));
 	assert_int_equal(stat(mesh_path, &after), 0);
 	assert_int_equal(before.st_ino, after.st_ino);
 	e.set = 0;
-	solution.direct[3] = (double)INFINITY;
-	assert_int_equal(rad_file_write(rad_path, &model, &solution, &info, &e), -1);
-	solution.direct[3] = 1.5;
+	solution.irradiance.direct[3] = (double)INFINITY;
+	assert_int_equal(file_rad_write(rad_path, &model, &solution, &info, &e), -1);
+	solution.irradiance.direct[3] = 1.5;
 	assert_non_null(strstr(e.text, "a.rad: cannot write: array irradiance_direct: value 3"));
 }
 
@@ -447,28 +447,28 @@ static void test_bad_model_is_not_written(void **state)
 static void forge(const char *path, const char *name, size_t at, const void *value, size_t bytes)
 {
 	struct err e = { 0 };
-	struct container *c = container_open(path, NULL, &e);
-	struct container_writer *w = container_create(path, &e);
+	struct container *c = file_container_open(path, NULL, &e);
+	struct container_writer *w = file_container_create(path, &e);
 
 	assert_true(c && w);
-	for (size_t i = 0; i < container_metas(c); i++) {
-		const char *text, *key = container_meta_at(c, i, &text);
+	for (size_t i = 0; i < file_container_metas(c); i++) {
+		const char *text, *key = file_container_meta_at(c, i, &text);
 		if (strncmp(key, "digest.", 7))
-			must(container_meta(w, key, strcmp(key, name) ? text : value, &e), &e);
+			must(file_container_meta(w, key, strcmp(key, name) ? text : value, &e), &e);
 	}
-	for (size_t i = 0; i < container_arrays(c); i++) {
-		const struct container_view *v = container_at(c, i);
-		size_t size = v->count * dtype_size(v->type);
+	for (size_t i = 0; i < file_container_arrays(c); i++) {
+		const struct container_view *v = file_container_at(c, i);
+		size_t size = v->count * file_dtype_size(v->type);
 		char *data = copy(v->data, size);
 		if (strcmp(v->name, name) == 0) {
 			assert_true(at + bytes <= size);
 			memcpy(data + at, value, bytes);
 		}
-		must(container_put(w, v->name, v->type, v->dims, v->shape, data, &e), &e);
+		must(file_container_put(w, v->name, v->type, v->dims, v->shape, data, &e), &e);
 		free(data);
 	}
-	must(container_finish(w, &e), &e);
-	container_close(c);
+	must(file_container_finish(w, &e), &e);
+	file_container_close(c);
 }
 
 static void refuse_forged(const char *name, size_t at, const void *value, size_t bytes,
@@ -479,7 +479,7 @@ static void refuse_forged(const char *name, size_t at, const void *value, size_t
 
 	write_ff();
 	forge(ff_path, name, at, value, bytes);
-	if (!ff_file_open(ff_path, NULL, NULL, &f, &e) || !strstr(e.text, message))
+	if (!file_ff_open(ff_path, NULL, NULL, &f, &e) || !strstr(e.text, message))
 		fail_msg("'%s' instead of '%s'", e.set ? e.text : "accepted", message);
 	assert_non_null(strstr(e.text, "; run ffcalc again"));
 }
@@ -516,7 +516,7 @@ static void refuse_ff(void *where, const void *value, size_t bytes, const char *
 	memcpy(where, value, bytes);
 	must(try_write_ff(&ff, 0, &e), &e);
 	memcpy(where, old, bytes);
-	if (!ff_file_open(ff_path, NULL, NULL, &f, &e) || !strstr(e.text, message))
+	if (!file_ff_open(ff_path, NULL, NULL, &f, &e) || !strstr(e.text, message))
 		fail_msg("'%s' instead of '%s'", e.set ? e.text : "accepted", message);
 	assert_non_null(strstr(e.text, "a.ff: array "));
 	assert_non_null(strstr(e.text, "; run ffcalc again"));
@@ -534,29 +534,29 @@ static void test_refused_form_factors(void **state)
 	REFUSE(ff.column[0], uint32_t, 6, "array column: value 0 is 6");
 	REFUSE(ff.column[1], uint32_t, 1, "array column: value 1 is out of order");
 	REFUSE(ff.column[1], uint32_t, 0, "array column: value 1 is out of order");
-	REFUSE(ff.row_scale[3], double, 0, "array row_scale: value 3 is 0");
-	REFUSE(ff.row_error[0], float, -1, "array row_error");
-	REFUSE(ff.row_residual[0], float, (float)NAN, "array row_residual");
-	REFUSE(ff.row_side[1], uint32_t, 4, "array row_side: row 1 leaves patch 2");
-	REFUSE(ff.row_kind[1], uint8_t, 5, "array row_kind: value 1 is 5");
-	REFUSE(ff.row_kind[1], uint8_t, 4, "array row_side: row 1 leaves source 1, which is no light");
-	REFUSE(ff.row_block[1], uint64_t, 0, "array row_block");
-	REFUSE(ff.row_block[1], uint64_t, UINT64_MAX, "array row_block");
-	REFUSE(ff.block_arrival[1], uint64_t, 2, "array block_arrival");
-	REFUSE(ff.block_chain[0], uint32_t, 1, "array block_chain: row 0 does not begin");
-	REFUSE(ff.block_chain[1], uint32_t, 0, "array block_chain: block 1 is out of order");
-	REFUSE(ff.block_chain[1], uint32_t, 2, "array block_chain: value 1 is 2");
-	REFUSE(ff.block_escape[1], double, -1, "array block_escape");
-	REFUSE(ff.chain_event[0], uint32_t, 8, "array chain_event");
-	REFUSE(ff.chain_count[0], uint32_t, 0, "array chain_count");
-	REFUSE(ff.chain_start[1], uint64_t, 1, "chain 0 is not empty");
-	REFUSE(ff.arrival_target[0], uint32_t, 4, "array arrival_target");
-	REFUSE(ff.arrival_direction[0], float, 1, "array arrival_direction");
-	REFUSE(ff.link_source[0], uint32_t, 5, "array link_source");
-	REFUSE(ff.link_chain[0], uint32_t, 2, "array link_chain");
-	REFUSE(ff.link_target[0], uint32_t, 1, "array link_row: link 0 has row 3");
+	REFUSE(ff.row.scale[3], double, 0, "array row_scale: value 3 is 0");
+	REFUSE(ff.row.error[0], float, -1, "array row_error");
+	REFUSE(ff.row.residual[0], float, (float)NAN, "array row_residual");
+	REFUSE(ff.row.side[1], uint32_t, 4, "array row_side: row 1 leaves patch 2");
+	REFUSE(ff.row.kind[1], uint8_t, 5, "array row_kind: value 1 is 5");
+	REFUSE(ff.row.kind[1], uint8_t, 4, "array row_side: row 1 leaves source 1, which is no light");
+	REFUSE(ff.row.block[1], uint64_t, 0, "array row_block");
+	REFUSE(ff.row.block[1], uint64_t, UINT64_MAX, "array row_block");
+	REFUSE(ff.block.arrival[1], uint64_t, 2, "array block_arrival");
+	REFUSE(ff.block.chain[0], uint32_t, 1, "array block_chain: row 0 does not begin");
+	REFUSE(ff.block.chain[1], uint32_t, 0, "array block_chain: block 1 is out of order");
+	REFUSE(ff.block.chain[1], uint32_t, 2, "array block_chain: value 1 is 2");
+	REFUSE(ff.block.escape[1], double, -1, "array block_escape");
+	REFUSE(ff.chain.event[0], uint32_t, 8, "array chain_event");
+	REFUSE(ff.chain.count[0], uint32_t, 0, "array chain_count");
+	REFUSE(ff.chain.start[1], uint64_t, 1, "chain 0 is not empty");
+	REFUSE(ff.arrival.target[0], uint32_t, 4, "array arrival_target");
+	REFUSE(ff.arrival.direction[0], float, 1, "array arrival_direction");
+	REFUSE(ff.link.source[0], uint32_t, 5, "array link_source");
+	REFUSE(ff.link.chain[0], uint32_t, 2, "array link_chain");
+	REFUSE(ff.link.target[0], uint32_t, 1, "array link_row: link 0 has row 3");
 	REFUSE(ff.patch_end, uint32_t, 3, "array part: patches 0 to 3 of 2");
-	REFUSE(ff.part, uint32_t, 2, "array part: part 2 of 1");
+	REFUSE(ff.shard, uint32_t, 2, "array part: part 2 of 1");
 }
 
 /* ---- damaged files ---- */
@@ -570,16 +570,16 @@ static int read_file(const char *path, struct err *e)
 	int failed;
 
 	if (path == ff_path) {
-		failed = ff_file_open(path, NULL, NULL, &f, e);
+		failed = file_ff_open(path, NULL, NULL, &f, e);
 		if (!failed)
-			ff_file_close(&f);
+			file_ff_close(&f);
 		return failed;
 	}
-	failed = path == mesh_path ? mesh_file_read(path, &m, &i, e)
-	                           : rad_file_read(path, &m, &s, &i, e);
+	failed = path == mesh_path ? file_mesh_read(path, &m, &i, e)
+	                           : file_rad_read(path, &m, &s, &i, e);
 	model_free(&m);
 	solution_free(&s);
-	cache_info_free(&i);
+	file_cache_info_free(&i);
 	return failed;
 }
 
@@ -631,7 +631,7 @@ static void test_wrong_kind(void **state)
 
 	(void)state;
 	write_rad();
-	assert_int_equal(mesh_file_read(rad_path, &m, &i, &e), -1);
+	assert_int_equal(file_mesh_read(rad_path, &m, &i, &e), -1);
 	assert_non_null(strstr(e.text, "this is a twopass.rad file; a twopass.mesh file"));
 }
 
@@ -641,16 +641,16 @@ static void test_foreign_ids(void **state)
 	struct err e = { 0 };
 	struct cache_info ids = { 0 };
 	struct model m = { 0 };
-	struct container_writer *w = container_create(mesh_path, &e);
+	struct container_writer *w = file_container_create(mesh_path, &e);
 
 	(void)state;
 	model.vertex[0] = 1e-9;
-	cache_ids(&model, &ids);
+	file_cache_ids(&model, &ids);
 	model.vertex[0] = 0;
-	must(mesh_put_model(w, &model, &e), &e);
-	must(cache_write_info(w, "twopass.mesh", &ids, &e), &e);
-	must(container_finish(w, &e), &e);
-	assert_int_equal(mesh_file_read(mesh_path, &m, &ids, &e), -1);
+	must(file_mesh_put_model(w, &model, &e), &e);
+	must(file_cache_write_info(w, "twopass.mesh", &ids, &e), &e);
+	must(file_container_finish(w, &e), &e);
+	assert_int_equal(file_mesh_read(mesh_path, &m, &ids, &e), -1);
 	assert_non_null(strstr(e.text, "metadata geometry_id: not that of the arrays"));
 }
 
@@ -662,20 +662,20 @@ static void test_digest(void **state)
 
 	(void)state;
 	write_mesh();
-	struct container *c = container_open(mesh_path, NULL, &e);
-	container_digest(c, a);
-	container_close(c);
+	struct container *c = file_container_open(mesh_path, NULL, &e);
+	file_container_digest(c, a);
+	file_container_close(c);
 	model.camera[0].to_world[12] = 3;
 	write_mesh();
-	c = container_open(mesh_path, NULL, &e);
-	container_digest(c, b);
-	container_close(c);
+	c = file_container_open(mesh_path, NULL, &e);
+	file_container_digest(c, b);
+	file_container_close(c);
 	model.camera[0].to_world[12] = 0;
 	model.material.rho_d[0] = .4;
 	write_mesh();
-	c = container_open(mesh_path, NULL, &e);
-	container_digest(c, d);
-	container_close(c);
+	c = file_container_open(mesh_path, NULL, &e);
+	file_container_digest(c, d);
+	file_container_close(c);
 	model.material.rho_d[0] = .5;
 	assert_string_equal(a, b);
 	assert_string_not_equal(a, d);

@@ -30,13 +30,13 @@ static void test_sizes(void **state)
 	int w = 0, h = -1;
 	(void)state;
 
-	assert_int_equal(camera_parse_size("320x200", &w, &h), 0);
+	assert_int_equal(picture_camera_parse_size("320x200", &w, &h), 0);
 	assert_int_equal(w, 320);
 	assert_int_equal(h, 200);
 	static const char *const wrong[] = { "", "x", "64", "64x", "3x", "x3", "3x0", "0x3", "-3x4", "3x4x5",
 		"3 x4", "3x+4", "99999999999x1", "3x4 ", "1e2x3" };
 	for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
-		assert_int_equal(camera_parse_size(wrong[i], &w, &h), -1);
+		assert_int_equal(picture_camera_parse_size(wrong[i], &w, &h), -1);
 }
 
 static void test_resolution(void **state)
@@ -46,22 +46,22 @@ static void test_resolution(void **state)
 	struct err e = { 0 };
 	(void)state;
 
-	assert_int_equal(camera_frame(&c, 0, 0, &f, &e), 0);
+	assert_int_equal(picture_camera_frame(&c, 0, 0, &f, &e), 0);
 	assert_int_equal(f.width, 640);
 	assert_int_equal(f.height, 320);
-	assert_int_equal(camera_frame(&c, 100, 100, &f, &e), 0); /* the size wins */
+	assert_int_equal(picture_camera_frame(&c, 100, 100, &f, &e), 0); /* the size wins */
 	assert_true(f.half_x == f.half_y);
 	c.aspect = 0;
-	assert_int_equal(camera_frame(&c, 0, 0, &f, &e), 0);
+	assert_int_equal(picture_camera_frame(&c, 0, 0, &f, &e), 0);
 	assert_int_equal(f.height, 480);
 	memcpy(o.to_world, identity, sizeof identity);
-	assert_int_equal(camera_frame(&o, 300, 0, &f, &e), 0);
+	assert_int_equal(picture_camera_frame(&o, 300, 0, &f, &e), 0);
 	assert_int_equal(f.height, 100);
 	c.aspect = 1e-6;
-	assert_int_equal(camera_frame(&c, 0, 0, &f, &e), -1);
+	assert_int_equal(picture_camera_frame(&c, 0, 0, &f, &e), -1);
 	assert_non_null(strstr(e.text, "camera 'c'"));
 	struct camera blind = perspective(0, 1);
-	assert_int_equal(camera_frame(&blind, 0, 0, &f, &e), -1);
+	assert_int_equal(picture_camera_frame(&blind, 0, 0, &f, &e), -1);
 }
 
 static void test_perspective_rays(void **state)
@@ -72,13 +72,13 @@ static void test_perspective_rays(void **state)
 	double org[3], dir[3];
 	(void)state;
 
-	assert_int_equal(camera_frame(&c, 200, 100, &f, &e), 0);
-	camera_ray(&f, 100, 50, org, dir);
+	assert_int_equal(picture_camera_frame(&c, 200, 100, &f, &e), 0);
+	picture_camera_ray(&f, 100, 50, org, dir);
 	near_vector(org, 0, 0, 0);
 	near_vector(dir, 0, 0, -1);
-	camera_ray(&f, 0, 0, org, dir); /* top left: x = -1, y = .5 at z = -1 */
+	picture_camera_ray(&f, 0, 0, org, dir); /* top left: x = -1, y = .5 at z = -1 */
 	near_vector(dir, -1 / 1.5, .5 / 1.5, -1 / 1.5);
-	camera_ray(&f, 200, 100, org, dir);
+	picture_camera_ray(&f, 200, 100, org, dir);
 	near_vector(dir, 1 / 1.5, -.5 / 1.5, -1 / 1.5);
 }
 
@@ -92,12 +92,12 @@ static void test_orthographic_rays(void **state)
 
 	memcpy(c.to_world, identity, sizeof identity);
 	c.to_world[14] = 5;
-	assert_int_equal(camera_frame(&c, 4, 2, &f, &e), 0);
-	camera_ray(&f, 0, 0, org, dir);
+	assert_int_equal(picture_camera_frame(&c, 4, 2, &f, &e), 0);
+	picture_camera_ray(&f, 0, 0, org, dir);
 	near_vector(org, -2, 1, 5);
 	near_vector(dir, 0, 0, -1);
 	double p[3] = { 7, 8, 2 };
-	assert_true(fabs(camera_depth(&f, p) - 3) < 1e-12);
+	assert_true(fabs(picture_camera_depth(&f, p) - 3) < 1e-12);
 }
 
 static void test_look_at(void **state)
@@ -110,23 +110,23 @@ static void test_look_at(void **state)
 	float w[16];
 	(void)state;
 
-	assert_int_equal(camera_look_at(eye, target, up, 90, &c, &e), 0);
-	assert_int_equal(camera_frame(&c, 10, 10, &f, &e), 0);
-	camera_ray(&f, 5, 5, org, dir);
+	assert_int_equal(picture_camera_look_at(eye, target, up, 90, &c, &e), 0);
+	assert_int_equal(picture_camera_frame(&c, 10, 10, &f, &e), 0);
+	picture_camera_ray(&f, 5, 5, org, dir);
 	near_vector(org, 1, 2, 3);
 	near_vector(dir, 1, 0, 0);
-	camera_ray(&f, 5, 0, org, dir);
+	picture_camera_ray(&f, 5, 0, org, dir);
 	near_vector(dir, sqrt(.5), 0, sqrt(.5));
-	camera_world_to_camera(&f, w);
+	picture_camera_world_to_camera(&f, w);
 	double x[4] = { 4, 1, 7, 1 }, y[3] = { 0, 0, 0 }; /* right is -y here */
 	for (int j = 0; j < 3; j++)
 		for (int k = 0; k < 4; k++)
 			y[j] += x[k] * (double)w[4 * k + j];
 	assert_true(fabs(y[0] - 1) + fabs(y[1] - 4) + fabs(y[2] - 3) < 1e-6);
-	assert_int_equal(camera_look_at(eye, eye, up, 90, &c, &e), -1);
-	assert_int_equal(camera_look_at(eye, target, along, 90, &c, &e), -1);
-	assert_int_equal(camera_look_at(eye, target, zero, 90, &c, &e), -1);
-	assert_int_equal(camera_look_at(eye, target, up, 180, &c, &e), -1);
+	assert_int_equal(picture_camera_look_at(eye, eye, up, 90, &c, &e), -1);
+	assert_int_equal(picture_camera_look_at(eye, target, along, 90, &c, &e), -1);
+	assert_int_equal(picture_camera_look_at(eye, target, zero, 90, &c, &e), -1);
+	assert_int_equal(picture_camera_look_at(eye, target, up, 180, &c, &e), -1);
 }
 
 static void test_names(void **state)
@@ -138,11 +138,11 @@ static void test_names(void **state)
 
 	list[0].name = (char *)"front";
 	list[1].name = (char *)"side";
-	assert_int_equal(camera_find(&m, "side", &e), 1);
-	assert_int_equal(camera_find(&m, "top", &e), -1);
+	assert_int_equal(picture_camera_find(&m, "side", &e), 1);
+	assert_int_equal(picture_camera_find(&m, "top", &e), -1);
 	assert_string_equal(e.text, "no camera 'top'; there are: front, side");
 	e.set = 0;
-	assert_int_equal(camera_find(&none, "top", &e), -1);
+	assert_int_equal(picture_camera_find(&none, "top", &e), -1);
 	assert_non_null(strstr(e.text, "--eye"));
 }
 

@@ -276,8 +276,8 @@ static int killed(int argc, char **argv)
 	(void)argc;
 	cli_signals();
 	snprintf(path, sizeof path, "%s/out", directory);
-	struct atomic_file *f = atomic_file_create(path, &e);
-	if (!f || atomic_file_write(f, "x", 1, &e))
+	struct atomic_file *f = file_atomic_create(path, &e);
+	if (!f || file_atomic_write(f, "x", 1, &e))
 		return cli_fail(&c, &e);
 	raise(atoi(argv[1]));
 	return 0;

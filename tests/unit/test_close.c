@@ -55,7 +55,7 @@ static void closes_and_improves(void **state)
 		size_t n = make(d, wrong, missing, &r);
 		for (int i = 0; i < ROWS; i++)
 			closed[i] = 1;
-		assert_int_equal(ff_close(d, n, ROWS, missing, closed, change, &e), 0);
+		assert_int_equal(ff_closure(d, n, ROWS, missing, closed, change, &e), 0);
 		for (size_t k = 0; k < n; k++) {
 			missing[d[k].i] -= change[k];
 			missing[d[k].j] -= change[k];
@@ -75,7 +75,7 @@ static void open_rows(void **state)
 	struct err e = { 0 };
 
 	(void)state;
-	assert_int_equal(ff_close(d, 3, 4, missing, closed, change, &e), 0);
+	assert_int_equal(ff_closure(d, 3, 4, missing, closed, change, &e), 0);
 	assert_true(fabs(change[0] + change[1] - 1e-3) < 1e-15);
 	assert_true(fabs(change[1]) < 1e-8);
 	assert_true(change[2] == 0);
@@ -88,7 +88,7 @@ static void nothing_in_doubt(void **state)
 	struct err e = { 0 };
 
 	(void)state;
-	assert_int_equal(ff_close(NULL, 0, 2, missing, closed, NULL, &e), 0);
+	assert_int_equal(ff_closure(NULL, 0, 2, missing, closed, NULL, &e), 0);
 }
 
 int main(void)

@@ -16,8 +16,8 @@ static void two_images(struct image *a, struct image *b)
 {
 	struct err e = { 0 };
 
-	assert_int_equal(image_new(a, 4, 2, 3, names, &e), 0);
-	assert_int_equal(image_new(b, 4, 2, 3, names, &e), 0);
+	assert_int_equal(picture_image_new(a, 4, 2, 3, names, &e), 0);
+	assert_int_equal(picture_image_new(b, 4, 2, 3, names, &e), 0);
 }
 
 static void compare(const struct image *a, const int *channel, const struct image *b, int n,
@@ -25,7 +25,7 @@ static void compare(const struct image *a, const int *channel, const struct imag
 {
 	struct err e = { 0 };
 
-	assert_int_equal(compare_channels(a, channel, b, channel, n, mask, d, &e), 0);
+	assert_int_equal(picture_compare_channels(a, channel, b, channel, n, mask, d, &e), 0);
 }
 
 static void near(double got, double expected)
@@ -45,8 +45,8 @@ static void test_equal(void **state)
 	assert_int_equal(d.pixels, 8);
 	assert_true(d.rmse == 0 && d.relative_rmse == 0 && d.bias == 0 && d.relative_bias == 0);
 	assert_true(d.max == 0 && d.max_x == 0 && d.max_y == 0);
-	image_free(&a);
-	image_free(&b);
+	picture_image_free(&a);
+	picture_image_free(&b);
 }
 
 static void test_numbers(void **state)
@@ -73,8 +73,8 @@ static void test_numbers(void **state)
 	near(d.max, 4);
 	assert_int_equal(d.max_x, 2);
 	assert_int_equal(d.max_y, 1);
-	image_free(&a);
-	image_free(&b);
+	picture_image_free(&a);
+	picture_image_free(&b);
 }
 
 static void test_not_finite(void **state)
@@ -97,8 +97,8 @@ static void test_not_finite(void **state)
 	assert_int_equal(d.pixels, 0);
 	assert_int_equal(d.left_out, 8);
 	assert_true(d.rmse == 0 && d.max_x == -1);
-	image_free(&a);
-	image_free(&b);
+	picture_image_free(&a);
+	picture_image_free(&b);
 }
 
 static void test_black_yardstick(void **state)
@@ -112,8 +112,8 @@ static void test_black_yardstick(void **state)
 	compare(&a, rgb, &b, 3, NULL, &d);
 	assert_true(isinf(d.relative_rmse) && d.relative_rmse > 0);
 	assert_true(isinf(d.relative_bias) && d.relative_bias < 0);
-	image_free(&a);
-	image_free(&b);
+	picture_image_free(&a);
+	picture_image_free(&b);
 }
 
 /* 100 pixels with errors of 1 to 100 per mille, against hand counts. */
@@ -126,23 +126,23 @@ static void test_percentiles(void **state)
 	struct err e = { 0 };
 
 	(void)state;
-	assert_int_equal(image_new(&a, 10, 10, 1, one, &e), 0);
-	assert_int_equal(image_new(&b, 10, 10, 1, one, &e), 0);
+	assert_int_equal(picture_image_new(&a, 10, 10, 1, one, &e), 0);
+	assert_int_equal(picture_image_new(&b, 10, 10, 1, one, &e), 0);
 	for (int i = 0; i < 100; i++) {
 		b.pixel[i] = -1000;
 		a.pixel[i] = b.pixel[i] + (float)(1 + (37 * i) % 100) * (i % 2 ? 1 : -1);
 	}
 	compare(&a, red, &b, 1, NULL, &d);
 	for (int i = 0; i < COMPARE_PERCENTILES; i++)
-		assert_true(fabs(d.percentile[i] - compare_percentile[i] * 1e-3) < 1e-7);
+		assert_true(fabs(d.percentile[i] - picture_compare_percentile[i] * 1e-3) < 1e-7);
 	for (int i = 0; i < 100; i++)
 		mask[i] = 1 + (37 * i) % 100 > 10;
 	compare(&a, red, &b, 1, mask, &d);
 	assert_int_equal(d.pixels, 10);
 	assert_int_equal(d.excluded, 90);
 	assert_true(fabs(d.percentile[0] - .005) < 1e-7 && fabs(d.percentile[2] - .01) < 1e-7);
-	image_free(&a);
-	image_free(&b);
+	picture_image_free(&a);
+	picture_image_free(&b);
 }
 
 /* The relative error of a pixel is that of its colour as a vector. */
@@ -159,8 +159,8 @@ static void test_colour_error(void **state)
 	}
 	compare(&a, rgb, &b, 3, NULL, &d);
 	assert_true(fabs(d.percentile[0] - .1) < 1e-7 && fabs(d.percentile[2] - .1) < 1e-7);
-	image_free(&a);
-	image_free(&b);
+	picture_image_free(&a);
+	picture_image_free(&b);
 }
 
 static void test_masks(void **state)
@@ -171,20 +171,20 @@ static void test_masks(void **state)
 	struct err e = { 0 };
 
 	(void)state;
-	assert_int_equal(image_new(&im, 4, 2, 4, many, &e), 0);
+	assert_int_equal(picture_image_new(&im, 4, 2, 4, many, &e), 0);
 	im.pixel[8 + 3] = 1;
 	im.pixel[24 + 5] = INFINITY;
-	assert_int_equal(compare_mask_emitters(&im, mask), 0);
+	assert_int_equal(picture_compare_mask_emitters(&im, mask), 0);
 	for (int i = 0; i < 8; i++)
 		assert_int_equal(mask[i], i == 3);
-	assert_int_equal(compare_mask_nothing(&im, mask), 0);
+	assert_int_equal(picture_compare_mask_nothing(&im, mask), 0);
 	for (int i = 0; i < 8; i++)
 		assert_int_equal(mask[i], i == 3 || i == 5);
-	image_free(&im);
-	assert_int_equal(image_new(&im, 4, 2, 3, names, &e), 0);
-	assert_int_equal(compare_mask_emitters(&im, mask), -1);
-	assert_int_equal(compare_mask_nothing(&im, mask), -1);
-	image_free(&im);
+	picture_image_free(&im);
+	assert_int_equal(picture_image_new(&im, 4, 2, 3, names, &e), 0);
+	assert_int_equal(picture_compare_mask_emitters(&im, mask), -1);
+	assert_int_equal(picture_compare_mask_nothing(&im, mask), -1);
+	picture_image_free(&im);
 }
 
 static void test_difference(void **state)
@@ -197,13 +197,13 @@ static void test_difference(void **state)
 	two_images(&a, &b);
 	a.pixel[8 + 5] = 3;
 	b.pixel[8 + 5] = 4.5f;
-	assert_int_equal(compare_difference(&a, green, &b, green, 1, &c, &e), 0);
+	assert_int_equal(picture_compare_difference(&a, green, &b, green, 1, &c, &e), 0);
 	assert_int_equal(c.channels, 1);
 	assert_string_equal(c.name[0], "G");
 	assert_true(c.pixel[5] == -1.5f && c.pixel[4] == 0);
-	image_free(&a);
-	image_free(&b);
-	image_free(&c);
+	picture_image_free(&a);
+	picture_image_free(&b);
+	picture_image_free(&c);
 }
 
 static void test_layers(void **state)
@@ -215,16 +215,16 @@ static void test_layers(void **state)
 	int c[3];
 
 	(void)state;
-	assert_int_equal(image_new(&im, 1, 1, 8, many, &e), 0);
-	assert_int_equal(image_layer(&im, "diffuse", c), 3);
+	assert_int_equal(picture_image_new(&im, 1, 1, 8, many, &e), 0);
+	assert_int_equal(picture_image_layer(&im, "diffuse", c), 3);
 	assert_true(c[0] == 3 && c[1] == 2 && c[2] == 1);
-	assert_int_equal(image_layer(&im, "N", c), 3);
-	assert_int_equal(image_layer(&im, "Z", c), 1);
+	assert_int_equal(picture_image_layer(&im, "N", c), 3);
+	assert_int_equal(picture_image_layer(&im, "Z", c), 1);
 	assert_true(c[0] == 0 && c[2] == 0);
-	assert_int_equal(image_layer(&im, "half", c), 0);
-	assert_int_equal(image_layer(&im, "half.R", c), 1);
-	assert_int_equal(image_layer(&im, NULL, c), 0);
-	image_free(&im);
+	assert_int_equal(picture_image_layer(&im, "half", c), 0);
+	assert_int_equal(picture_image_layer(&im, "half.R", c), 1);
+	assert_int_equal(picture_image_layer(&im, NULL, c), 0);
+	picture_image_free(&im);
 }
 
 static void test_empty_image(void **state)
@@ -233,10 +233,10 @@ static void test_empty_image(void **state)
 	struct err e = { 0 }, f = { 0 };
 
 	(void)state;
-	assert_int_equal(image_new(&im, 0, 5, 3, names, &e), -1);
-	assert_int_equal(image_new(&im, 0x7fffffff, 0x7fffffff, 3, names, &f), -1);
+	assert_int_equal(picture_image_new(&im, 0, 5, 3, names, &e), -1);
+	assert_int_equal(picture_image_new(&im, 0x7fffffff, 0x7fffffff, 3, names, &f), -1);
 	assert_null(im.pixel);
-	image_free(&im);
+	picture_image_free(&im);
 }
 
 int main(void)

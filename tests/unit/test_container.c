@@ -49,33 +49,33 @@ static const uint8_t bytes3[3] = { 7, 8, 9 };
 static void write_sample(const char *where, const char *mark)
 {
 	struct err e = { 0 };
-	struct container_writer *w = container_create(where, &e);
+	struct container_writer *w = file_container_create(where, &e);
 	const uint64_t three = 3, shape[2] = { 3, 2 }, open[2] = { 0, 2 }, none[2] = { 0, 3 };
 
 	assert_non_null(w);
-	assert_int_equal(container_meta(w, "format", "twopass.mesh", &e), 0);
-	assert_int_equal(container_meta(w, "version", CACHE_VERSION, &e), 0);
-	assert_int_equal(container_meta(w, "key", mark, &e), 0);
-	assert_int_equal(container_put(w, "narrow", DT_U8, 1, &three, bytes3, &e), 0);
-	int rows = container_array(w, "rows", DT_F32, 2, open, &e);
-	assert_int_equal(container_put(w, "wide", DT_F64, 2, shape, doubles, &e), 0);
-	assert_int_equal(container_put(w, "empty", DT_I32, 2, none, NULL, &e), 0);
+	assert_int_equal(file_container_meta(w, "format", "twopass.mesh", &e), 0);
+	assert_int_equal(file_container_meta(w, "version", CACHE_VERSION, &e), 0);
+	assert_int_equal(file_container_meta(w, "key", mark, &e), 0);
+	assert_int_equal(file_container_put(w, "narrow", DT_U8, 1, &three, bytes3, &e), 0);
+	int rows = file_container_array(w, "rows", DT_F32, 2, open, &e);
+	assert_int_equal(file_container_put(w, "wide", DT_F64, 2, shape, doubles, &e), 0);
+	assert_int_equal(file_container_put(w, "empty", DT_I32, 2, none, NULL, &e), 0);
 	for (int i = 0; i < 5; i++)
-		assert_int_equal(container_write(w, rows, (float[2]){ (float)i, -1 }, 8, &e), 0);
-	assert_int_equal(container_finish(w, &e), 0);
+		assert_int_equal(file_container_write(w, rows, (float[2]){ (float)i, -1 }, 8, &e), 0);
+	assert_int_equal(file_container_finish(w, &e), 0);
 	assert_int_equal(e.set, 0);
 }
 
 static void check_sample(const char *where, const char *mark)
 {
 	struct err e = { 0 };
-	struct container *c = container_open(where, "twopass.mesh", &e);
+	struct container *c = file_container_open(where, "twopass.mesh", &e);
 
 	if (!c)
 		fail_msg("%s", e.text);
-	assert_string_equal(container_get_meta(c, "key"), mark);
-	assert_int_equal(container_verify_all(c, &e), 0);
-	container_close(c);
+	assert_string_equal(file_container_get_meta(c, "key"), mark);
+	assert_int_equal(file_container_verify_all(c, &e), 0);
+	file_container_close(c);
 }
 
 static void test_round_trip(void **state)
@@ -85,23 +85,23 @@ static void test_round_trip(void **state)
 
 	(void)state;
 	write_sample(path, "one");
-	struct container *c = container_open(path, NULL, &e);
+	struct container *c = file_container_open(path, NULL, &e);
 	assert_non_null(c);
-	assert_int_equal(container_arrays(c), 4);
-	const struct container_view *v = container_need(c, "wide", DT_F64, 2, any, &e);
+	assert_int_equal(file_container_arrays(c), 4);
+	const struct container_view *v = file_container_need(c, "wide", DT_F64, 2, any, &e);
 	assert_non_null(v);
 	assert_int_equal(v->count, 6);
 	assert_memory_equal(v->data, doubles, sizeof doubles);
 	assert_int_equal((uintptr_t)v->data % 8, 0);
-	v = container_need(c, "rows", DT_F32, 2, any, &e);
+	v = file_container_need(c, "rows", DT_F32, 2, any, &e);
 	assert_int_equal(v->shape[0], 5);
 	assert_true(((const float *)v->data)[8] == 4.f);
-	assert_memory_equal(container_find(c, "narrow")->data, bytes3, 3);
-	assert_int_equal(container_find(c, "empty")->count, 0);
-	assert_string_equal(container_at(c, 0)->name, "wide");
-	assert_string_equal(container_at(c, 3)->name, "narrow");
-	assert_int_equal(container_verify_all(c, &e), 0);
-	container_close(c);
+	assert_memory_equal(file_container_find(c, "narrow")->data, bytes3, 3);
+	assert_int_equal(file_container_find(c, "empty")->count, 0);
+	assert_string_equal(file_container_at(c, 0)->name, "wide");
+	assert_string_equal(file_container_at(c, 3)->name, "narrow");
+	assert_int_equal(file_container_verify_all(c, &e), 0);
+	file_container_close(c);
 }
 
 static void test_need_says_what_is_wrong(void **state)
@@ -111,15 +111,15 @@ static void test_need_says_what_is_wrong(void **state)
 
 	(void)state;
 	write_sample(path, "one");
-	struct container *c = container_open(path, NULL, &e);
-	assert_null(container_need(c, "absent", DT_F64, 1, &five, &e));
+	struct container *c = file_container_open(path, NULL, &e);
+	assert_null(file_container_need(c, "absent", DT_F64, 1, &five, &e));
 	assert_non_null(strstr(e.text, "a.mesh: array absent: missing; run mesh again"));
 	e.set = 0;
-	assert_null(container_need(c, "narrow", DT_U8, 1, &five, &e));
+	assert_null(file_container_need(c, "narrow", DT_U8, 1, &five, &e));
 	assert_non_null(strstr(e.text, "array narrow: it is U8 [3] and should be U8 [5]"));
-	container_close(c);
+	file_container_close(c);
 	e.set = 0;
-	assert_null(container_open(path, "twopass.ff", &e));
+	assert_null(file_container_open(path, "twopass.ff", &e));
 	assert_non_null(strstr(e.text, "a.mesh: this is a twopass.mesh file; a twopass.ff "
 	                       "file is needed"));
 }
@@ -130,30 +130,30 @@ static void test_spooled_arrays(void **state)
 	enum { N = 700001 };
 	const uint64_t open = 0;
 	struct err e = { 0 };
-	struct container_writer *w = container_create(path, &e);
+	struct container_writer *w = file_container_create(path, &e);
 
 	(void)state;
 	uint32_t *a = malloc(N * sizeof *a);
 	for (uint32_t i = 0; i < N; i++)
 		a[i] = i * 2654435761u;
-	container_meta(w, "format", "twopass.ff", &e);
-	int x = container_array(w, "x", DT_U32, 1, &open, &e);
-	int y = container_array(w, "y", DT_U32, 1, &open, &e);
+	file_container_meta(w, "format", "twopass.ff", &e);
+	int x = file_container_array(w, "x", DT_U32, 1, &open, &e);
+	int y = file_container_array(w, "y", DT_U32, 1, &open, &e);
 	for (size_t i = 0, n; i < N; i += n) {
 		n = i % 7919 + 1 < N - i ? i % 7919 + 1 : N - i;
-		assert_int_equal(container_write(w, x, a + i, 4 * n, &e), 0);
-		assert_int_equal(container_write(w, y, a + i, 4 * n, &e), 0);
+		assert_int_equal(file_container_write(w, x, a + i, 4 * n, &e), 0);
+		assert_int_equal(file_container_write(w, y, a + i, 4 * n, &e), 0);
 	}
-	assert_int_equal(container_write(w, y, a, 4 * N, &e), 0);
-	assert_int_equal(container_finish(w, &e), 0);
-	struct container *c = container_open(path, "twopass.ff", &e);
+	assert_int_equal(file_container_write(w, y, a, 4 * N, &e), 0);
+	assert_int_equal(file_container_finish(w, &e), 0);
+	struct container *c = file_container_open(path, "twopass.ff", &e);
 	assert_non_null(c);
-	assert_int_equal(container_verify_all(c, &e), 0);
-	assert_int_equal(container_find(c, "x")->count, N);
-	assert_memory_equal(container_find(c, "x")->data, a, 4 * N);
-	assert_memory_equal(container_find(c, "y")->data, a, 4 * N);
-	assert_memory_equal((const uint32_t *)container_find(c, "y")->data + N, a, 4 * N);
-	container_close(c);
+	assert_int_equal(file_container_verify_all(c, &e), 0);
+	assert_int_equal(file_container_find(c, "x")->count, N);
+	assert_memory_equal(file_container_find(c, "x")->data, a, 4 * N);
+	assert_memory_equal(file_container_find(c, "y")->data, a, 4 * N);
+	assert_memory_equal((const uint32_t *)file_container_find(c, "y")->data + N, a, 4 * N);
+	file_container_close(c);
 	free(a);
 }
 
@@ -166,10 +166,10 @@ static void test_wrong_amount(void **state)
 
 	(void)state;
 	write_sample(path, "old");
-	struct container_writer *w = container_create(path, &e);
-	int a = container_array(w, "short", DT_F64, 1, &four, &e);
-	container_write(w, a, doubles, 24, &e);
-	assert_int_equal(container_finish(w, &e), -1);
+	struct container_writer *w = file_container_create(path, &e);
+	int a = file_container_array(w, "short", DT_F64, 1, &four, &e);
+	file_container_write(w, a, doubles, 24, &e);
+	assert_int_equal(file_container_finish(w, &e), -1);
 	assert_non_null(strstr(e.text, "array short: 24 bytes were written, its shape needs 32"));
 	check_sample(path, "old");
 }
@@ -181,10 +181,10 @@ static void test_abandoned(void **state)
 
 	(void)state;
 	write_sample(path, "old");
-	struct container_writer *w = container_create(path, &e);
-	container_put(w, "x", DT_F64, 1, &n, doubles, &e);
-	container_abandon(w);
-	container_abandon(NULL);
+	struct container_writer *w = file_container_create(path, &e);
+	file_container_put(w, "x", DT_F64, 1, &n, doubles, &e);
+	file_container_abandon(w);
+	file_container_abandon(NULL);
 	check_sample(path, "old");
 }
 
@@ -194,34 +194,34 @@ static void test_bad_declarations(void **state)
 	const uint64_t n = 6;
 
 	(void)state;
-	struct container_writer *w = container_create(path, &e);
-	assert_true(container_array(w, "x", DT_F64, 1, &n, &e) >= 0);
-	assert_int_equal(container_array(w, "x", DT_F64, 1, &n, &e), -1);
+	struct container_writer *w = file_container_create(path, &e);
+	assert_true(file_container_array(w, "x", DT_F64, 1, &n, &e) >= 0);
+	assert_int_equal(file_container_array(w, "x", DT_F64, 1, &n, &e), -1);
 	assert_non_null(strstr(e.text, "array x: declared twice"));
 	e.set = 0;
-	assert_int_equal(container_array(w, "__metadata__", DT_F64, 1, &n, &e), -1);
+	assert_int_equal(file_container_array(w, "__metadata__", DT_F64, 1, &n, &e), -1);
 	e.set = 0;
-	assert_int_equal(container_meta(w, "bad", "\xff\xfe", &e), -1);
+	assert_int_equal(file_container_meta(w, "bad", "\xff\xfe", &e), -1);
 	assert_non_null(strstr(e.text, "metadata bad is not UTF-8"));
-	container_abandon(w);
+	file_container_abandon(w);
 }
 
 static void write_large(const char *where, struct err *e)
 {
 	const size_t n = 1 << 20;
 	const uint64_t open = 0;
-	struct container_writer *w = container_create(where, e);
+	struct container_writer *w = file_container_create(where, e);
 	char *zeros = calloc(n, 1);
 
 	if (w) {
-		int a = container_array(w, "large", DT_U8, 1, &open, e), failed = 0;
-		container_meta(w, "format", "twopass.mesh", e);
+		int a = file_container_array(w, "large", DT_U8, 1, &open, e), failed = 0;
+		file_container_meta(w, "format", "twopass.mesh", e);
 		for (int i = 0; i < 32 && !failed; i++)
-			failed = container_write(w, a, zeros, n, e);
+			failed = file_container_write(w, a, zeros, n, e);
 		if (failed)
-			container_abandon(w);
+			file_container_abandon(w);
 		else
-			container_finish(w, e);
+			file_container_finish(w, e);
 	}
 	free(zeros);
 }
@@ -265,10 +265,10 @@ static void test_no_directory(void **state)
 	struct err e = { 0 };
 
 	(void)state;
-	assert_null(container_create("/proc/nothing/here.mesh", &e));
+	assert_null(file_container_create("/proc/nothing/here.mesh", &e));
 	assert_non_null(strstr(e.text, "/proc/nothing/here.mesh: "));
 	e.set = 0;
-	assert_null(container_create(directory, &e));
+	assert_null(file_container_create(directory, &e));
 	assert_int_equal(e.set, 1);
 }
 
@@ -288,11 +288,11 @@ static void test_killed(void **state)
 		kill(child, SIGKILL);
 		waitpid(child, NULL, 0);
 		struct err e = { 0 };
-		struct container *c = container_open(path, "twopass.mesh", &e);
+		struct container *c = file_container_open(path, "twopass.mesh", &e);
 		if (!c)
 			fail_msg("%s", e.text);
-		assert_int_equal(container_verify_all(c, &e), 0);
-		container_close(c);
+		assert_int_equal(file_container_verify_all(c, &e), 0);
+		file_container_close(c);
 	}
 }
 
@@ -311,7 +311,7 @@ static void test_pipe(void **state)
 	write_sample(pipe_path, "piped");
 	waitpid(child, NULL, 0);
 	check_sample(path, "piped");
-	assert_null(container_open(pipe_path, NULL, &e));
+	assert_null(file_container_open(pipe_path, NULL, &e));
 	assert_non_null(strstr(e.text, "not a regular file"));
 	unlink(pipe_path);
 }
@@ -321,10 +321,10 @@ static void test_pipe(void **state)
 /* Opens, verifies and uses the file as a reader would: 0 if all was accepted. */
 static int read_through(const char *where, struct err *e)
 {
-	struct container *c = container_open(where, "twopass.mesh", e);
-	int failed = !c || container_verify_all(c, e);
+	struct container *c = file_container_open(where, "twopass.mesh", e);
+	int failed = !c || file_container_verify_all(c, e);
 
-	container_close(c);
+	file_container_close(c);
 	return failed;
 }
 
@@ -386,9 +386,9 @@ static void forge(const char *header, uint64_t claimed)
 
 	memset(text, ' ', sizeof text);
 	memcpy(text, header, strlen(header));
-	char *slot = container_header_slot(text, n);
+	char *slot = file_container_header_slot(text, n);
 	if (slot) {
-		container_header_digest(text, n, slot, hex);
+		file_container_header_digest(text, n, slot, hex);
 		memcpy(slot, hex, 32);
 	}
 	uint64_t prefix = claimed ? claimed : n;
@@ -458,7 +458,7 @@ static void test_forged_headers(void **state)
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct err e = { 0 };
 		forge(cases[i].header, 0);
-		struct container *c = container_open(path, "twopass.mesh", &e);
+		struct container *c = file_container_open(path, "twopass.mesh", &e);
 		if (!cases[i].message) {
 			if (!c)
 				fail_msg("case %zu: %s", i, e.text);
@@ -468,7 +468,7 @@ static void test_forged_headers(void **state)
 				         cases[i].message);
 			check_refusal(&e, path);
 		}
-		container_close(c);
+		file_container_close(c);
 	}
 }
 
@@ -481,7 +481,7 @@ static void test_absurd_lengths(void **state)
 	for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++) {
 		struct err e = { 0 };
 		forge(META ARRAY("a", "F64", "[8]", "0", "64") "}", lengths[i]);
-		assert_null(container_open(path, NULL, &e));
+		assert_null(file_container_open(path, NULL, &e));
 		check_refusal(&e, path);
 	}
 }
@@ -500,7 +500,7 @@ static void test_deep_json(void **state)
 	fwrite(deep, 1, DEPTH, f);
 	fclose(f);
 	free(deep);
-	assert_null(container_open(path, NULL, &e));
+	assert_null(file_container_open(path, NULL, &e));
 	check_refusal(&e, path);
 }
 
@@ -509,10 +509,10 @@ static void test_missing(void **state)
 	struct err e = { 0 };
 
 	(void)state;
-	assert_null(container_open("/nowhere/a.mesh", NULL, &e));
+	assert_null(file_container_open("/nowhere/a.mesh", NULL, &e));
 	assert_non_null(strstr(e.text, "/nowhere/a.mesh: cannot read: No such file"));
 	e.set = 0;
-	assert_null(container_open("/dev/null", NULL, &e));
+	assert_null(file_container_open("/dev/null", NULL, &e));
 	assert_non_null(strstr(e.text, "not a regular file"));
 }
 
@@ -522,19 +522,19 @@ static void digest_of(const char *key, const char *value, char hex[33])
 {
 	struct err e = { 0 };
 	const uint64_t n = 6;
-	struct container_writer *w = container_create(path, &e);
+	struct container_writer *w = file_container_create(path, &e);
 
-	container_meta(w, "format", "twopass.mesh", &e);
-	container_meta(w, "history", "mesh a.gltf", &e);
-	container_meta(w, key, value, &e);
-	container_put(w, "vertex", DT_F64, 1, &n, doubles, &e);
+	file_container_meta(w, "format", "twopass.mesh", &e);
+	file_container_meta(w, "history", "mesh a.gltf", &e);
+	file_container_meta(w, key, value, &e);
+	file_container_put(w, "vertex", DT_F64, 1, &n, doubles, &e);
 	if (strcmp(key, "camera_id") == 0)
-		container_put(w, "camera_yfov", DT_F64, 1, &n,
-		              value[0] == '1' ? doubles : (double[6]){ 0 }, &e);
-	assert_int_equal(container_finish(w, &e), 0);
-	struct container *c = container_open(path, NULL, &e);
-	container_digest(c, hex);
-	container_close(c);
+		file_container_put(w, "camera_yfov", DT_F64, 1, &n,
+		                   value[0] == '1' ? doubles : (double[6]){ 0 }, &e);
+	assert_int_equal(file_container_finish(w, &e), 0);
+	struct container *c = file_container_open(path, NULL, &e);
+	file_container_digest(c, hex);
+	file_container_close(c);
 }
 
 static void test_digest_is_loose_about_cameras(void **state)
@@ -561,16 +561,16 @@ static void test_up_to_date(void **state)
 	(void)state;
 	write_sample(path, "k1");
 	utimensat(AT_FDCWD, path, old, 0);
-	assert_int_equal(cache_up_to_date(path, "twopass.mesh", "k2"), 0);
-	assert_int_equal(cache_up_to_date(path, "twopass.ff", "k1"), 0);
-	assert_int_equal(cache_up_to_date("/nowhere", "twopass.mesh", "k1"), 0);
+	assert_int_equal(file_cache_up_to_date(path, "twopass.mesh", "k2"), 0);
+	assert_int_equal(file_cache_up_to_date(path, "twopass.ff", "k1"), 0);
+	assert_int_equal(file_cache_up_to_date("/nowhere", "twopass.mesh", "k1"), 0);
 	assert_int_equal(stat(path, &st), 0);
 	assert_int_equal(st.st_mtime, 1000);
-	assert_int_equal(cache_up_to_date(path, "twopass.mesh", "k1"), 1);
+	assert_int_equal(file_cache_up_to_date(path, "twopass.mesh", "k1"), 1);
 	assert_int_equal(stat(path, &st), 0);
 	assert_true(st.st_mtime > 1000);
 	assert_int_equal(truncate(path, st.st_size - 1), 0);
-	assert_int_equal(cache_up_to_date(path, "twopass.mesh", "k1"), 0);
+	assert_int_equal(file_cache_up_to_date(path, "twopass.mesh", "k1"), 0);
 }
 
 static void test_history(void **state)
@@ -596,7 +596,7 @@ static void test_history(void **state)
 		int argc = 0;
 		while (cases[i].argv[argc])
 			argc++;
-		char *h = history_append(cases[i].before, argc, cases[i].argv, &e);
+		char *h = file_history_append(cases[i].before, argc, cases[i].argv, &e);
 		assert_string_equal(h, cases[i].after);
 		free(h);
 	}

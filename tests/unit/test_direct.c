@@ -24,7 +24,7 @@ static void stage_new(struct stage *t, size_t surfaces, size_t n)
 {
 	*t = (struct stage){ 0 };
 	grid_new(&t->m, surfaces, n, 2, 1);
-	t->m.material.emission[material_at(&t->m.material, 1, FRONT)] = 1;
+	t->m.material.emission[model_material_at(&t->m.material, 1, FRONT)] = 1;
 	t->m.material.one_sided[1] = 1;
 }
 
@@ -43,14 +43,14 @@ static void stage_end(struct stage *t)
 
 	grid_end(&t->m);
 	assert_non_null(t->rays = ray_scene_new(&t->m, &e));
-	assert_non_null(t->d = direct_new(&t->m, t->rays, &e));
-	assert_non_null(t->w = direct_worker_new(t->d, &e));
+	assert_non_null(t->d = occ_direct_new(&t->m, t->rays, &e));
+	assert_non_null(t->w = occ_direct_worker_new(t->d, &e));
 }
 
 static void stage_free(struct stage *t)
 {
-	direct_worker_free(t->w);
-	direct_free(t->d);
+	occ_direct_worker_free(t->w);
+	occ_direct_free(t->d);
 	ray_scene_free(t->rays);
 	model_free(&t->m);
 }
@@ -69,19 +69,19 @@ static double lit(struct stage *t, double x, double y, int side, double *error)
 	struct err e = { 0 };
 	double at[3] = { x, y, 0 }, nothing = 0, h, off;
 
-	for (uint32_t i = 0; i < t->m.elements; i++) {
+	for (uint32_t i = 0; i < t->m.element.n; i++) {
 		const double *v[3];
 		double w[3], area = 0, n[3];
 		for (int k = 0; k < 3; k++)
-			v[k] = &t->m.vertex[3 * (size_t)t->m.element[3 * i + (uint32_t)k]];
+			v[k] = &t->m.vertex[3 * (size_t)t->m.element.corner[3 * i + (uint32_t)k]];
 		for (int k = 0; k < 3; k++) {
 			v3_area(at, v[(k + 1) % 3], v[(k + 2) % 3], n);
 			area += w[k] = n[2];
 		}
 		if (v[0][2] != 0 || w[0] < -1e-12 || w[1] < -1e-12 || w[2] < -1e-12)
 			continue;
-		direct_begin(t->w, 2 * i + (uint32_t)side);
-		assert_int_equal(direct_at(t->w, at, 1, 1e-3, &nothing, &h, &off, &e), 0);
+		occ_direct_begin(t->w, 2 * i + (uint32_t)side);
+		assert_int_equal(occ_direct_at(t->w, at, 1, 1e-3, &nothing, &h, &off, &e), 0);
 		*error = off;
 		return h;
 	}
@@ -178,7 +178,7 @@ static void test_sampled(void **state)
 		assert_true(error <= .01);
 	}
 	assert_true(off < 4 * stated && stated < 4 * off);
-	assert_true(direct_rays(t.w) > 0);
+	assert_true(occ_direct_rays(t.w) > 0);
 	stage_free(&t);
 }
 

@@ -61,9 +61,9 @@ static void sample(const struct model *m, size_t e, int i, int k, double w[3], d
 	w[2] = (k + 1. / 3) / SUB;
 	w[0] = 1 - w[1] - w[2];
 	for (int c = 0; c < 2; c++)
-		p[c] = w[0] * m->vertex[3 * m->element[3 * e] + (size_t)c] +
-		       w[1] * m->vertex[3 * m->element[3 * e + 1] + (size_t)c] +
-		       w[2] * m->vertex[3 * m->element[3 * e + 2] + (size_t)c];
+		p[c] = w[0] * m->vertex[3 * m->element.corner[3 * e] + (size_t)c] +
+		       w[1] * m->vertex[3 * m->element.corner[3 * e + 1] + (size_t)c] +
+		       w[2] * m->vertex[3 * m->element.corner[3 * e + 2] + (size_t)c];
 }
 
 static double mean(const struct model *m, size_t e, field *f)
@@ -88,7 +88,7 @@ static double square(const struct model *m, const struct reconstruction *r, size
 	for (int i = 0; i < SUB; i++)
 		for (int k = 0; i + k < SUB; k++, n++) {
 			sample(m, e, i, k, w, p);
-			reconstruction_at(r, e, FRONT, w, h);
+			interp_reconstruction_at(r, e, FRONT, w, h);
 			sum += (h[0] - f(p[0], p[1])) * (h[0] - f(p[0], p[1]));
 		}
 	return sum / n;
@@ -117,23 +117,23 @@ static struct outcome run_noisy(field *f, double noise, double said)
 				m.vertex[3 * (j * (N + 1) + i) + k] += .3 / N * (rng_uniform(&g) - .5);
 	grid_end(&m);
 	grid_solution(&m, 0, &s);
-	for (size_t i = 0; i < m.elements; i++) {
-		s.indirect[2 * i] = mean(&m, i, f) + noise * sqrt(12) * (rng_uniform(&g) - .5);
-		s.error[2 * i] = said;
+	for (size_t i = 0; i < m.element.n; i++) {
+		s.irradiance.indirect[2 * i] = mean(&m, i, f) + noise * sqrt(12) * (rng_uniform(&g) - .5);
+		s.error.sampling[2 * i] = said;
 	}
-	s.discretisation = calloc(2 * m.elements, sizeof *s.discretisation);
-	s.discretisation_direct = calloc(2 * m.elements, sizeof *s.discretisation_direct);
-	assert_int_equal(discretisation_estimate(&m, &s, 2, &e), 0);
-	assert_int_equal(reconstruct(&m, &s, PART_ALL, 1, &r, &e), 0);
-	for (size_t i = 0; i < m.elements; i++) {
-		o.exact += m.element_area[i] * square(&m, &r, i, f);
-		o.stated += m.element_area[i] * s.discretisation[2 * i] * s.discretisation[2 * i];
-		assert_true(s.discretisation[2 * i + 1] == 0);
+	s.error.discretisation = calloc(2 * m.element.n, sizeof *s.error.discretisation);
+	s.error.discretisation_direct = calloc(2 * m.element.n, sizeof *s.error.discretisation_direct);
+	assert_int_equal(interp_discretisation(&m, &s, 2, &e), 0);
+	assert_int_equal(interp_reconstruct(&m, &s, PART_ALL, 1, &r, &e), 0);
+	for (size_t i = 0; i < m.element.n; i++) {
+		o.exact += m.element.area[i] * square(&m, &r, i, f);
+		o.stated += m.element.area[i] * s.error.discretisation[2 * i] * s.error.discretisation[2 * i];
+		assert_true(s.error.discretisation[2 * i + 1] == 0);
 	}
-	o.noise = s.error[0];
+	o.noise = s.error.sampling[0];
 	o.exact = sqrt(o.exact);
 	o.stated = sqrt(o.stated);
-	reconstruction_free(&r);
+	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);
 	return o;

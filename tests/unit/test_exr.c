@@ -69,14 +69,14 @@ static void make_image(struct image *im, int width, int height)
 	static const char *const name[] = { "R", "G", "B", "Z", "element", long_name };
 	struct err e = { 0 };
 
-	assert_int_equal(image_new(im, width, height, 6, name, &e), 0);
+	assert_int_equal(picture_image_new(im, width, height, 6, name, &e), 0);
 	for (int c = 0; c < im->channels; c++)
 		for (int i = 0; i < width * height; i++)
-			image_plane(im, c)[i] = sinf((float)(i * (c + 1))) * (float)(1 << 2 * c);
-	image_plane(im, 0)[0] = NAN;
-	image_plane(im, 1)[1] = INFINITY;
-	image_plane(im, 2)[2] = 1e6f;
-	image_plane(im, 4)[0] = 16777215;
+			picture_image_plane(im, c)[i] = sinf((float)(i * (c + 1))) * (float)(1 << 2 * c);
+	picture_image_plane(im, 0)[0] = NAN;
+	picture_image_plane(im, 1)[1] = INFINITY;
+	picture_image_plane(im, 2)[2] = 1e6f;
+	picture_image_plane(im, 4)[0] = 16777215;
 }
 
 static void round_trip(int width, int height, enum exr_file_compression compression, int half)
@@ -87,15 +87,15 @@ static void round_trip(int width, int height, enum exr_file_compression compress
 	size_t clipped;
 
 	make_image(&a, width, height);
-	assert_int_equal(exr_file_write(place("a.exr"), &a, NULL, &o, &clipped, &e), 0);
+	assert_int_equal(file_exr_write(place("a.exr"), &a, NULL, &o, &clipped, &e), 0);
 	assert_int_equal(clipped, half ? 1 : 0);
-	assert_int_equal(exr_file_read(place("a.exr"), &b, NULL, &e), 0);
+	assert_int_equal(file_exr_read(place("a.exr"), &b, NULL, &e), 0);
 	assert_int_equal(b.width, width);
 	assert_int_equal(b.height, height);
 	assert_int_equal(b.channels, a.channels);
 	for (int c = 0; c < a.channels; c++) {
-		const float *x = image_plane(&a, c);
-		const float *y = image_plane(&b, image_channel(&b, a.name[c]));
+		const float *x = picture_image_plane(&a, c);
+		const float *y = picture_image_plane(&b, picture_image_channel(&b, a.name[c]));
 		int as_half = half && (c < 3 || c == 5);
 
 		for (int i = 0; i < width * height; i++) {
@@ -109,8 +109,8 @@ static void round_trip(int width, int height, enum exr_file_compression compress
 				assert_true(x[i] == y[i]);
 		}
 	}
-	image_free(&a);
-	image_free(&b);
+	picture_image_free(&a);
+	picture_image_free(&b);
 }
 
 static void test_round_trip(void **state)
@@ -135,18 +135,18 @@ static size_t size_with_noise(int noisy, enum exr_file_compression compression)
 	struct err e = { 0 };
 	size_t size;
 
-	assert_int_equal(image_new(&a, WIDTH, HEIGHT, 3, rgb, &e), 0);
+	assert_int_equal(picture_image_new(&a, WIDTH, HEIGHT, 3, rgb, &e), 0);
 	for (int c = 0; c < 3; c++)
 		for (int i = noisy * WIDTH; i < WIDTH * HEIGHT; i++)
-			image_plane(&a, c)[i] = c > 0 || i % 4 ? (float)rng_uniform(&g) : 0;
-	assert_int_equal(exr_file_write(place("a.exr"), &a, NULL, &o, NULL, &e), 0);
-	assert_int_equal(exr_file_read(place("a.exr"), &b, NULL, &e), 0);
+			picture_image_plane(&a, c)[i] = c > 0 || i % 4 ? (float)rng_uniform(&g) : 0;
+	assert_int_equal(file_exr_write(place("a.exr"), &a, NULL, &o, NULL, &e), 0);
+	assert_int_equal(file_exr_read(place("a.exr"), &b, NULL, &e), 0);
 	for (int c = 0; c < 3; c++)
-		assert_memory_equal(image_plane(&a, c), image_plane(&b, image_channel(&b, rgb[c])),
+		assert_memory_equal(picture_image_plane(&a, c), picture_image_plane(&b, picture_image_channel(&b, rgb[c])),
 		                    WIDTH * HEIGHT * sizeof *a.pixel);
 	free(slurp(place("a.exr"), &size));
-	image_free(&a);
-	image_free(&b);
+	picture_image_free(&a);
+	picture_image_free(&b);
 	return size;
 }
 
@@ -165,10 +165,10 @@ static void test_auto(void **state)
 static void test_names(void **state)
 {
 	(void)state;
-	assert_int_equal(exr_file_compression_by_name("auto"), EXR_FILE_AUTO);
-	assert_int_equal(exr_file_compression_by_name("zip"), EXR_FILE_ZIP);
-	assert_int_equal(exr_file_compression_by_name("none"), EXR_FILE_NONE);
-	assert_int_equal(exr_file_compression_by_name("dwaa"), -1);
+	assert_int_equal(file_exr_compression_by_name("auto"), EXR_FILE_AUTO);
+	assert_int_equal(file_exr_compression_by_name("zip"), EXR_FILE_ZIP);
+	assert_int_equal(file_exr_compression_by_name("none"), EXR_FILE_NONE);
+	assert_int_equal(file_exr_compression_by_name("dwaa"), -1);
 }
 
 static void test_attributes(void **state)
@@ -181,22 +181,22 @@ static void test_attributes(void **state)
 	make_image(&im, 5, 40);
 	for (int k = 0; k < 16; k++)
 		i.world_to_camera[k] = (float)k / 3;
-	assert_int_equal(exr_file_info_set(&i, EXR_FILE_CAMERA, "wrong", &e), 0);
-	assert_int_equal(exr_file_info_set(&i, EXR_FILE_CAMERA, "door", &e), 0);
-	assert_int_equal(exr_file_info_set(&i, EXR_FILE_HISTORY, "mesh a\nffcalc b\n", &e), 0);
-	assert_int_equal(exr_file_info_set(&i, "twopassAnAttributeWithAVeryLongName", "", &e), 0);
-	assert_int_equal(exr_file_write(place("b.exr"), &im, &i, NULL, NULL, &e), 0);
-	assert_int_equal(exr_file_read_info(place("b.exr"), &j, &e), 0);
+	assert_int_equal(file_exr_info_set(&i, EXR_FILE_CAMERA, "wrong", &e), 0);
+	assert_int_equal(file_exr_info_set(&i, EXR_FILE_CAMERA, "door", &e), 0);
+	assert_int_equal(file_exr_info_set(&i, EXR_FILE_HISTORY, "mesh a\nffcalc b\n", &e), 0);
+	assert_int_equal(file_exr_info_set(&i, "twopassAnAttributeWithAVeryLongName", "", &e), 0);
+	assert_int_equal(file_exr_write(place("b.exr"), &im, &i, NULL, NULL, &e), 0);
+	assert_int_equal(file_exr_read_info(place("b.exr"), &j, &e), 0);
 	assert_int_equal(j.strings, 3);
-	assert_string_equal(exr_file_info_get(&j, "camera"), "door");
-	assert_string_equal(exr_file_info_get(&j, "history"), "mesh a\nffcalc b\n");
-	assert_string_equal(exr_file_info_get(&j, "twopassAnAttributeWithAVeryLongName"), "");
-	assert_null(exr_file_info_get(&j, "missing"));
+	assert_string_equal(file_exr_info_get(&j, "camera"), "door");
+	assert_string_equal(file_exr_info_get(&j, "history"), "mesh a\nffcalc b\n");
+	assert_string_equal(file_exr_info_get(&j, "twopassAnAttributeWithAVeryLongName"), "");
+	assert_null(file_exr_info_get(&j, "missing"));
 	assert_true(j.white_luminance == 1 && j.has_world_to_camera);
 	assert_memory_equal(j.world_to_camera, i.world_to_camera, sizeof i.world_to_camera);
-	exr_file_info_free(&i);
-	exr_file_info_free(&j);
-	image_free(&im);
+	file_exr_info_free(&i);
+	file_exr_info_free(&j);
+	picture_image_free(&im);
 }
 
 static void test_same_bytes(void **state)
@@ -208,15 +208,15 @@ static void test_same_bytes(void **state)
 
 	(void)state;
 	make_image(&im, 130, 33);
-	assert_int_equal(exr_file_write(place("a.exr"), &im, NULL, NULL, NULL, &e), 0);
-	assert_int_equal(exr_file_write(place("another.exr"), &im, NULL, NULL, NULL, &e), 0);
+	assert_int_equal(file_exr_write(place("a.exr"), &im, NULL, NULL, NULL, &e), 0);
+	assert_int_equal(file_exr_write(place("another.exr"), &im, NULL, NULL, NULL, &e), 0);
 	a = slurp(place("a.exr"), &n);
 	b = slurp(place("another.exr"), &m);
 	assert_int_equal(n, m);
 	assert_memory_equal(a, b, n);
 	free(a);
 	free(b);
-	image_free(&im);
+	picture_image_free(&im);
 }
 
 static void test_bad_names(void **state)
@@ -226,13 +226,13 @@ static void test_bad_names(void **state)
 	struct err e = { 0 }, f = { 0 };
 
 	(void)state;
-	assert_int_equal(image_new(&im, 1, 1, 2, twice, &e), 0);
-	assert_int_equal(exr_file_write(place("n.exr"), &im, NULL, NULL, NULL, &e), -1);
+	assert_int_equal(picture_image_new(&im, 1, 1, 2, twice, &e), 0);
+	assert_int_equal(file_exr_write(place("n.exr"), &im, NULL, NULL, NULL, &e), -1);
 	assert_non_null(strstr(e.text, "given twice"));
-	image_free(&im);
-	assert_int_equal(image_new(&im, 1, 1, 1, empty, &f), 0);
-	assert_int_equal(exr_file_write(place("n.exr"), &im, NULL, NULL, NULL, &f), -1);
-	image_free(&im);
+	picture_image_free(&im);
+	assert_int_equal(picture_image_new(&im, 1, 1, 1, empty, &f), 0);
+	assert_int_equal(file_exr_write(place("n.exr"), &im, NULL, NULL, NULL, &f), -1);
+	picture_image_free(&im);
 	assert_int_not_equal(access(place("n.exr"), F_OK), 0);
 }
 
@@ -352,14 +352,14 @@ static void test_foreign(void **state)
 		struct err e = { 0 };
 
 		write_foreign(place("f.exr"), &file[i]);
-		if (exr_file_read(place("f.exr"), &im, NULL, &e))
+		if (file_exr_read(place("f.exr"), &im, NULL, &e))
 			fail_msg("%s", e.text);
 		assert_int_equal(im.width, file[i].width);
 		assert_int_equal(im.height, file[i].height);
 		for (int y = 0; y < im.height; y++)
 			for (int x = 0; x < im.width; x++)
 				assert_true(im.pixel[y * im.width + x] == (float)(1000 * y + x));
-		image_free(&im);
+		picture_image_free(&im);
 	}
 }
 
@@ -369,7 +369,7 @@ static void refuse(const char *path, const char *why)
 	struct exr_file_info info;
 	struct err e = { 0 };
 
-	assert_int_equal(exr_file_read(path, &im, &info, &e), -1);
+	assert_int_equal(file_exr_read(path, &im, &info, &e), -1);
 	assert_null(im.pixel);
 	assert_null(info.string);
 	if (!strstr(e.text, why))
@@ -410,10 +410,10 @@ static void write_small(int width, int height, enum exr_file_compression compres
 	struct err e = { 0 };
 
 	make_image(&im, width, height);
-	assert_int_equal(exr_file_info_set(&i, EXR_FILE_CAMERA, "c", &e), 0);
-	assert_int_equal(exr_file_write(place("small.exr"), &im, &i, &o, NULL, &e), 0);
-	exr_file_info_free(&i);
-	image_free(&im);
+	assert_int_equal(file_exr_info_set(&i, EXR_FILE_CAMERA, "c", &e), 0);
+	assert_int_equal(file_exr_write(place("small.exr"), &im, &i, &o, NULL, &e), 0);
+	file_exr_info_free(&i);
+	picture_image_free(&im);
 }
 
 static void test_truncated(void **state)
@@ -430,7 +430,7 @@ static void test_truncated(void **state)
 
 		spill(place("t.exr"), bytes, n);
 		refuse(place("t.exr"), "OpenEXR file");
-		assert_int_equal(exr_file_read_info(place("t.exr"), &info, &e), -1);
+		assert_int_equal(file_exr_read_info(place("t.exr"), &info, &e), -1);
 	}
 	free(bytes);
 }
@@ -453,9 +453,9 @@ static int flip_all(enum exr_file_compression compression)
 
 		bytes[n / 3] ^= mask[n % 3];
 		spill(place("t.exr"), bytes, size);
-		refused += exr_file_read(place("t.exr"), &im, &info, &e) != 0;
-		image_free(&im);
-		exr_file_info_free(&info);
+		refused += file_exr_read(place("t.exr"), &im, &info, &e) != 0;
+		picture_image_free(&im);
+		file_exr_info_free(&info);
 		bytes[n / 3] ^= mask[n % 3];
 	}
 	free(bytes);
@@ -505,28 +505,28 @@ static void test_old_file_kept(void **state)
 
 	(void)state;
 	make_image(&im, 40, 40);
-	assert_int_equal(exr_file_write("/dev/full", &im, NULL, NULL, NULL, &e), -1);
+	assert_int_equal(file_exr_write("/dev/full", &im, NULL, NULL, NULL, &e), -1);
 	assert_string_equal(e.text, "/dev/full: cannot write: No space left on device");
-	assert_int_equal(exr_file_write("/nowhere/a.exr", &im, NULL, NULL, NULL, &f), -1);
+	assert_int_equal(file_exr_write("/nowhere/a.exr", &im, NULL, NULL, NULL, &f), -1);
 	assert_non_null(strstr(f.text, "/nowhere/a.exr: cannot create"));
-	image_free(&im);
+	picture_image_free(&im);
 
 	spill(place("kept"), "old", 3);
 	assert_int_equal(chmod(place("kept"), 0640), 0);
 	assert_int_equal(symlink(place("kept"), place("link")), 0);
 	files = files_in_directory();
 	struct err g = { 0 };
-	struct atomic_file *a = atomic_file_create(place("link"), &g);
+	struct atomic_file *a = file_atomic_create(place("link"), &g);
 	assert_non_null(a);
-	assert_int_equal(atomic_file_write(a, "new", 3, &g), 0);
+	assert_int_equal(file_atomic_write(a, "new", 3, &g), 0);
 	assert_int_equal(files_in_directory(), files + 1);
-	atomic_file_abandon(a);
+	file_atomic_abandon(a);
 	assert_int_equal(files_in_directory(), files);
 
-	a = atomic_file_create(place("link"), &g);
-	atomic_file_remove_temporaries();
+	a = file_atomic_create(place("link"), &g);
+	file_atomic_remove_temporaries();
 	assert_int_equal(files_in_directory(), files);
-	assert_int_equal(atomic_file_finish(a, &g), -1);
+	assert_int_equal(file_atomic_finish(a, &g), -1);
 	size_t n;
 	unsigned char *bytes = slurp(place("kept"), &n);
 	assert_int_equal(n, 3);
@@ -534,7 +534,7 @@ static void test_old_file_kept(void **state)
 	free(bytes);
 
 	struct err h = { 0 };
-	assert_int_equal(atomic_file_put(place("link"), "newer", 5, &h), 0);
+	assert_int_equal(file_atomic_put(place("link"), "newer", 5, &h), 0);
 	assert_int_equal(lstat(place("link"), &st), 0);
 	assert_true(S_ISLNK(st.st_mode));
 	assert_int_equal(stat(place("kept"), &st), 0);

@@ -20,15 +20,15 @@ static struct ff_options options(uint32_t gather)
 {
 	return (struct ff_options){ .method = FF_RAYS, .rays = 4096, .points = 1,
 		.emitter_gain = 8, .gather = gather, .lobe_rays = 64, .depth = 16, .seed = 1,
-		.f64 = 1, .part = 1, .parts = 1, .threads = 2 };
+		.f64 = 1, .shard = 1, .shards = 1, .threads = 2 };
 }
 
 /* Meshes a scene whose report nobody reads. */
-static void mesh(struct model *m, struct mesher_options o)
+static void mesh(struct model *m, struct mesh_options o)
 {
-	struct mesher_report r = run(m, o);
+	struct mesh_report r = run(m, o);
 
-	mesher_report_free(&r);
+	mesh_report_free(&r);
 }
 
 /* The room with its ceiling at z = 1, meshed; the ceiling gives light or not. */
@@ -41,10 +41,10 @@ static void make(struct model *m, double emission, int shelf)
 		struct model room;
 		make_room(&room);
 		for (size_t i = 0; i < room.vertices; i++)
-			add_vertex(m, room.vertex[3 * i], room.vertex[3 * i + 1], room.vertex[3 * i + 2]);
-		for (size_t i = 0; i < room.triangles; i++)
-			add_triangle(m, room.triangle[3 * i], room.triangle[3 * i + 1],
-			             room.triangle[3 * i + 2], room.triangle_surface[i]);
+			mesh_add_vertex(m, room.vertex[3 * i], room.vertex[3 * i + 1], room.vertex[3 * i + 2]);
+		for (size_t i = 0; i < room.triangle.n; i++)
+			add_triangle(m, room.triangle.corner[3 * i], room.triangle.corner[3 * i + 1],
+			             room.triangle.corner[3 * i + 2], room.triangle.surface[i]);
 		add_rectangle(m, (double[]){ .1, .2, .4 }, (double[]){ .5, 0, 0 },
 		              (double[]){ 0, .6, 0 }, SHELF);
 		model_free(&room);
@@ -75,29 +75,29 @@ static double lambert(const double x[3], const double n[3], const double (*corne
  * rows of a form-factor file. */
 static double *lit_by(const struct model *m, const struct ff *f, uint32_t from)
 {
-	double *h = calloc(2 * m->elements, sizeof *h);
+	double *h = calloc(2 * m->element.n, sizeof *h);
 
-	for (size_t r = 0; r < f->rows; r++) {
-		uint32_t patch = f->row_side[r] >> 1;
-		uint64_t b = f->row_block[r];
-		if (m->patch_surface[patch] != from)
+	for (size_t r = 0; r < f->row.n; r++) {
+		uint32_t patch = f->row.side[r] >> 1;
+		uint64_t b = f->row.block[r];
+		if (m->patch.surface[patch] != from)
 			continue;
-		for (uint64_t i = f->block_start[b]; i < f->block_start[b + 1]; i++)
-			h[f->column[i]] += ff_value(f, i) * f->row_scale[r] * m->patch_area[patch] /
-			                   m->element_area[f->column[i] >> 1];
+		for (uint64_t i = f->block.start[b]; i < f->block.start[b + 1]; i++)
+			h[f->column[i]] += ff_value(f, i) * f->row.scale[r] * m->patch.area[patch] /
+			                   m->element.area[f->column[i] >> 1];
 	}
 	return h;
 }
 
 static void check_closure(const struct ff *f)
 {
-	for (size_t r = 0; r < f->rows; r++) {
-		uint64_t b = f->row_block[r];
-		double sum = f->block_escape[b] + f->block_black[b] + f->block_lost[b] + f->block_cut[b];
-		for (uint64_t i = f->block_start[b]; i < f->block_start[b + 1]; i++)
+	for (size_t r = 0; r < f->row.n; r++) {
+		uint64_t b = f->row.block[r];
+		double sum = f->block.escape[b] + f->block.black[b] + f->block.lost[b] + f->block.cut[b];
+		for (uint64_t i = f->block.start[b]; i < f->block.start[b + 1]; i++)
 			sum += ff_value(f, i);
-		assert_true(fabs(sum * f->row_scale[r] - 1) <= 1e-12);
-		assert_true(f->row_error[r] >= 0 && f->row_error[r] < .1);
+		assert_true(fabs(sum * f->row.scale[r] - 1) <= 1e-12);
+		assert_true(f->row.error[r] >= 0 && f->row.error[r] < .1);
 	}
 }
 
@@ -113,17 +113,17 @@ static double floor_error(const struct model *m, const struct ff_options *o)
 	memory_ff(m, o, &f, &stats);
 	check_closure(&f);
 	double *h = lit_by(m, &f, CEILING);
-	for (uint32_t el = 0; el < m->elements; el++) {
+	for (uint32_t el = 0; el < m->element.n; el++) {
 		double x[3] = { 0 };
-		const double *n = &m->element_normal[3 * (size_t)el];
-		if (m->patch_surface[m->element_patch[el]] != 0)
+		const double *n = &m->element.normal[3 * (size_t)el];
+		if (m->patch.surface[m->element.patch[el]] != 0)
 			continue;
 		assert_true(n[2] > .99);
 		for (size_t k = 0; k < 3; k++)
-			v3_mad(x, 1. / 3, &m->vertex[3 * (size_t)m->element[3 * (size_t)el + k]], x);
+			v3_mad(x, 1. / 3, &m->vertex[3 * (size_t)m->element.corner[3 * (size_t)el + k]], x);
 		double exact = lambert(x, n, ceiling, 4), d = h[2 * el] / exact - 1;
-		squares += m->element_area[el] * d * d;
-		area += m->element_area[el];
+		squares += m->element.area[el] * d * d;
+		area += m->element.area[el];
 	}
 	assert_true(fabs(area - 1) < 1e-9);
 	free(h);
@@ -178,8 +178,8 @@ static void hidden(void **state)
 	for (uint32_t from = 0; from < 7; from++) {
 		double *h[2] = { lit_by(&m, &f[0], from), lit_by(&m, &f[1], from) };
 		double squares = 0, sum = 0, flux[2] = { 0 };
-		for (size_t i = 0; i < 2 * m.elements; i++) {
-			double area = m.element_area[i / 2];
+		for (size_t i = 0; i < 2 * m.element.n; i++) {
+			double area = m.element.area[i / 2];
 			squares += area * (h[0][i] - h[1][i]) * (h[0][i] - h[1][i]);
 			sum += area * h[0][i] * h[0][i];
 			flux[0] += area * h[0][i];
@@ -215,12 +215,12 @@ static void open_scene(void **state)
 	memory_ff(&m, &o, &f, &stats);
 	check_closure(&f);
 	double *h = lit_by(&m, &f, 0);
-	for (size_t i = 0; i < 2 * m.elements; i++)
-		got += h[i] * m.element_area[i / 2];
-	for (size_t r = 0; r < f.rows; r++)
-		if (m.patch_surface[f.row_side[r] >> 1] == 0)
-			escape += f.block_escape[f.row_block[r]] * f.row_scale[r] *
-			          m.patch_area[f.row_side[r] >> 1];
+	for (size_t i = 0; i < 2 * m.element.n; i++)
+		got += h[i] * m.element.area[i / 2];
+	for (size_t r = 0; r < f.row.n; r++)
+		if (m.patch.surface[f.row.side[r] >> 1] == 0)
+			escape += f.block.escape[f.row.block[r]] * f.row.scale[r] *
+			          m.patch.area[f.row.side[r] >> 1];
 	print_message("F %.6f\n", got);
 	assert_true(fabs(got - .199825) < .001);
 	assert_true(fabs(got + escape - 1) < 1e-9);
@@ -246,8 +246,8 @@ static double at_a_right_angle(const struct ff_options *o, double element_size)
 	memory_ff(&m, o, &f, &stats);
 	check_closure(&f);
 	double *h = lit_by(&m, &f, 0);
-	for (size_t i = 0; i < 2 * m.elements; i++)
-		got += h[i] * m.element_area[i / 2];
+	for (size_t i = 0; i < 2 * m.element.n; i++)
+		got += h[i] * m.element.area[i / 2];
 	print_message("F %.6f\n", got);
 	free(h);
 	ff_free(&f);
@@ -294,7 +294,7 @@ static void any_threads(void **state)
 	assert_int_equal(f[0].entries, f[1].entries);
 	assert_memory_equal(f[0].column, f[1].column, f[0].entries * sizeof *f[0].column);
 	assert_memory_equal(f[0].value64, f[1].value64, f[0].entries * sizeof *f[0].value64);
-	assert_memory_equal(f[0].row_error, f[1].row_error, f[0].rows * sizeof *f[0].row_error);
+	assert_memory_equal(f[0].row.error, f[1].row.error, f[0].row.n * sizeof *f[0].row.error);
 	ff_free(&f[0]);
 	ff_free(&f[1]);
 	model_free(&m);
@@ -312,9 +312,9 @@ static double shared_rays(double emission, uint32_t *most, uint32_t *least)
 
 	make(&m, emission, 0);
 	assert_int_equal(ff_job_init(&j, &m, &o, &e) || ff_job_prepare(&j, 1, &e) ||
-	                 ff_gather(&j, &rays, NULL, &e) || ff_share_rays(&j, &e), 0);
+	                 ff_reciprocal_cast(&j, &rays, NULL, &e) || ff_share_rays(&j, &e), 0);
 	*most = 0, *least = UINT32_MAX;
-	for (uint32_t ps = 0; ps < 2 * m.patches; ps++) {
+	for (uint32_t ps = 0; ps < 2 * m.patch.n; ps++) {
 		uint32_t n = ff_row_rays(&j, ps);
 		if (j.emits[ps])
 			assert_int_equal(n, o.rays * o.emitter_gain);

@@ -51,7 +51,7 @@ static int noted(const struct scene *s, const char *part)
 
 static const double *corner(const struct model *m, size_t t, size_t k)
 {
-	return m->vertex + 3 * (size_t)m->triangle[3 * t + k];
+	return m->vertex + 3 * (size_t)m->triangle.corner[3 * t + k];
 }
 
 #define assert_point(p, x, y, z) do { \
@@ -65,9 +65,9 @@ static void test_base(void **state)
 
 	(void)state;
 	assert_int_equal(s.m.bands, 1);
-	assert_int_equal(s.m.triangles, 2);
+	assert_int_equal(s.m.triangle.n, 2);
 	assert_int_equal(s.m.vertices, 4);
-	assert_int_equal(s.m.elements, 0);
+	assert_int_equal(s.m.element.n, 0);
 	assert_string_equal(s.m.surface.name[0], "floor");
 	assert_int_equal(s.m.surface.has_normals[0], 0);
 	assert_point(corner(&s.m, 1, 1), 1, 1, 0);
@@ -114,7 +114,7 @@ static void test_glb_is_the_same(void **state)
 		fail_msg("%s", b.e.text);
 	assert_int_equal(a.m.vertices, b.m.vertices);
 	assert_memory_equal(a.m.vertex, b.m.vertex, 24 * a.m.vertices);
-	assert_memory_equal(a.m.triangle, b.m.triangle, 12 * a.m.triangles);
+	assert_memory_equal(a.m.triangle.corner, b.m.triangle.corner, 12 * a.m.triangle.n);
 	end(&a);
 	end(&b);
 }
@@ -136,7 +136,7 @@ static void test_modes(void **state)
 	struct scene s = read_edited("'indices':1,", "'mode':5,", NULL);
 
 	(void)state;
-	assert_int_equal(s.m.triangles, 2);
+	assert_int_equal(s.m.triangle.n, 2);
 	assert_point(corner(&s.m, 0, 0), 0, 0, 0);
 	assert_point(corner(&s.m, 0, 2), 1, 1, 0);
 	assert_point(corner(&s.m, 1, 0), 1, 0, 0); /* the odd one: 1, 3, 2 */
@@ -144,13 +144,13 @@ static void test_modes(void **state)
 	assert_point(corner(&s.m, 1, 2), 1, 1, 0);
 	end(&s);
 	s = read_edited("'indices':1,", "'mode':6,", NULL);
-	assert_int_equal(s.m.triangles, 2);
+	assert_int_equal(s.m.triangle.n, 2);
 	assert_point(corner(&s.m, 1, 0), 1, 1, 0); /* 2, 3, 0 */
 	assert_point(corner(&s.m, 1, 1), 0, 1, 0);
 	assert_point(corner(&s.m, 1, 2), 0, 0, 0);
 	end(&s);
 	s = read_edited("'indices':1,", "'mode':1,", NULL);
-	assert_int_equal(s.m.triangles, 0);
+	assert_int_equal(s.m.triangle.n, 0);
 	assert_int_equal(s.m.surface.n, 0);
 	assert_int_equal(s.r.skipped, 1);
 	assert_true(noted(&s, "points and lines are skipped"));
@@ -192,15 +192,15 @@ static void test_attributes_and_mirroring(void **state)
 
 	(void)state;
 	assert_int_equal(s.m.surface.has_normals[0], 1);
-	assert_float_equal(s.m.triangle_normal[5], 1, 1e-7);
-	assert_float_equal(s.m.triangle_uv[4], 1, 1e-7);
+	assert_float_equal(s.m.triangle.normal[5], 1, 1e-7);
+	assert_float_equal(s.m.triangle.uv[4], 1, 1e-7);
 	end(&s);
 	s = read_edited("'POSITION':0}", "'POSITION':0,'NORMAL':2,'TEXCOORD_0':3}",
 	                "'mesh':0", "'mesh':0,'scale':[-2,1,3]", NULL);
 	assert_point(corner(&s.m, 0, 1), -2, 1, 0); /* the winding is turned over */
 	assert_point(corner(&s.m, 0, 2), -2, 0, 0);
-	assert_float_equal(s.m.triangle_uv[3], 1, 1e-7);
-	assert_float_equal(s.m.triangle_normal[2], 1, 1e-7);
+	assert_float_equal(s.m.triangle.uv[3], 1, 1e-7);
+	assert_float_equal(s.m.triangle.normal[2], 1, 1e-7);
 	end(&s);
 }
 
@@ -218,13 +218,13 @@ static void test_hierarchy(void **state)
 	assert_point(corner(&s.m, 0, 2), 9, 2, 5);
 	end(&s);
 	s = read_edited("'nodes':[0,1]", "'nodes':[1]", NULL); /* not in the scene */
-	assert_int_equal(s.m.triangles, 0);
+	assert_int_equal(s.m.triangle.n, 0);
 	end(&s);
 	s = read_edited("'scene':0,'scenes':[{'nodes':[0,1]}],", "", NULL);
-	assert_int_equal(s.m.triangles, 2);
+	assert_int_equal(s.m.triangle.n, 2);
 	end(&s);
 	s = read_edited("'scene':0,'scenes':[", "'scene':1,'scenes':[{'nodes':[1]},", NULL);
-	assert_int_equal(s.m.triangles, 2);
+	assert_int_equal(s.m.triangle.n, 2);
 	assert_true(noted(&s, "the file has 2 scenes, only scenes[1] is read"));
 	end(&s);
 }
@@ -460,9 +460,9 @@ static void test_notes(void **state)
 
 static void test_rules_keep_energy(void **state)
 {
-	struct rules_gltf g = rules_gltf_default;
-	struct rules_side s, folded;
-	struct rules_folding f;
+	struct bsdf_gltf g = bsdf_gltf_default;
+	struct bsdf_side s, folded;
+	struct bsdf_folding f;
 
 	(void)state;
 	for (int i = 0; i < 3 * 3 * 3 * 3 * 3; i++) {
@@ -471,17 +471,17 @@ static void test_rules_keep_energy(void **state)
 		g.transmission = i / 9 % 3 / 2.;
 		g.diffuse_transmission = i / 27 % 3 / 2.;
 		g.opacity = i / 81 % 3 / 2.;
-		rules_from_gltf(&g, 0, 0, &s, &f);
-		rules_from_gltf(&g, 2, INFINITY, &folded, &f);
+		bsdf_from_gltf(&g, 0, 0, &s, &f);
+		bsdf_from_gltf(&g, 2, INFINITY, &folded, &f);
 		for (int b = 0; b < 3; b++) {
-			assert_true(rules_albedo(&s, b) <= 1 + 1e-12);
-			assert_near(rules_albedo(&s, b), rules_albedo(&folded, b));
+			assert_true(bsdf_side_albedo(&s, b) <= 1 + 1e-12);
+			assert_near(bsdf_side_albedo(&s, b), bsdf_side_albedo(&folded, b));
 			assert_near(folded.rho_s[b], 0);
 			assert_near(folded.tau_s[b], 1 - g.opacity);
 		}
 	}
-	assert_true(isinf(rules_exponent(0)));
-	assert_near(rules_exponent(1), 0);
+	assert_true(isinf(bsdf_lobe_exponent(0)));
+	assert_near(bsdf_lobe_exponent(1), 0);
 }
 
 int main(void)

@@ -19,20 +19,20 @@ static struct model model_new(size_t vertices, size_t elements)
 	struct model m = { 0 };
 
 	m.vertex = calloc(3 * vertices, sizeof *m.vertex);
-	m.element = calloc(3 * elements, sizeof *m.element);
+	m.element.corner = calloc(3 * elements, sizeof *m.element.corner);
 	assert_non_null(m.vertex);
-	assert_non_null(m.element);
+	assert_non_null(m.element.corner);
 	return m;
 }
 
 static void add_triangle(struct model *m, uint32_t a, uint32_t b, uint32_t c)
 {
-	uint32_t *e = &m->element[3 * m->elements++];
+	uint32_t *e = &m->element.corner[3 * m->element.n++];
 
 	e[0] = a, e[1] = b, e[2] = c;
 }
 
-static uint32_t add_vertex(struct model *m, double x, double y, double z)
+static uint32_t mesh_add_vertex(struct model *m, double x, double y, double z)
 {
 	double *p = &m->vertex[3 * m->vertices];
 
@@ -51,7 +51,7 @@ static void add_grid(struct model *m, const double o[3], const double u[3],
 			double p[3];
 			v3_mad(o, (double)i / n, u, p);
 			v3_mad(p, (double)j / n, v, p);
-			add_vertex(m, p[0], p[1], p[2]);
+			mesh_add_vertex(m, p[0], p[1], p[2]);
 		}
 	for (uint32_t j = 0; j < n; j++)
 		for (uint32_t i = 0; i < n; i++) {
@@ -69,8 +69,8 @@ static struct model cube_model(const double lo[3], double size)
 	struct model m = model_new(8, 12);
 
 	for (int i = 0; i < 8; i++)
-		add_vertex(&m, lo[0] + (i & 1 ? size : 0), lo[1] + (i & 2 ? size : 0),
-		           lo[2] + (i & 4 ? size : 0));
+		mesh_add_vertex(&m, lo[0] + (i & 1 ? size : 0), lo[1] + (i & 2 ? size : 0),
+		                lo[2] + (i & 4 ? size : 0));
 	for (int i = 0; i < 6; i++) {
 		add_triangle(&m, quad[i][0], quad[i][1], quad[i][2]);
 		add_triangle(&m, quad[i][0], quad[i][2], quad[i][3]);
@@ -80,8 +80,8 @@ static struct model cube_model(const double lo[3], double size)
 
 /* Everything needed to draw a model at resolution n. */
 struct stage {
-	struct hemi_grid grid;
-	struct hemi_scene *scene;
+	struct hemicube_grid grid;
+	struct hemicube_scene *scene;
 	struct hemicube cube;
 };
 
@@ -90,8 +90,8 @@ static struct stage stage_new(const struct model *m, int n)
 	struct err e = { 0 };
 	struct stage s = { 0 };
 
-	assert_int_equal(hemi_grid_init(&s.grid, n, &e), 0);
-	s.scene = hemi_scene_new(m, &e);
+	assert_int_equal(ff_hemicube_grid_init(&s.grid, n, &e), 0);
+	s.scene = ff_hemicube_scene_new(m, &e);
 	assert_non_null(s.scene);
 	return s;
 }
@@ -101,15 +101,15 @@ static void draw(struct stage *s, const double eye[3], double frame[3][3], uint3
 	struct err e = { 0 };
 
 	if (!s->cube.item)
-		assert_int_equal(hemicube_init(&s->cube, &s->grid, &e), 0);
-	hemicube_render(&s->cube, s->scene, eye, (const double (*)[3])frame, own);
+		assert_int_equal(ff_hemicube_init(&s->cube, &s->grid, &e), 0);
+	ff_hemicube_render(&s->cube, s->scene, eye, (const double (*)[3])frame, own);
 }
 
 static void stage_free(struct stage *s)
 {
-	hemicube_free(&s->cube);
-	hemi_scene_free(s->scene);
-	hemi_grid_free(&s->grid);
+	ff_hemicube_free(&s->cube);
+	ff_hemicube_scene_free(s->scene);
+	ff_hemicube_grid_free(&s->grid);
 }
 
 /* A frame about n, turned by `angle`. */
@@ -138,7 +138,7 @@ static size_t count_void(const struct stage *s)
 	size_t n = 0;
 
 	for (size_t i = 0; i < s->grid.pixels; i++)
-		n += s->cube.item[i] == HEMI_VOID;
+		n += s->cube.item[i] == HEMICUBE_VOID;
 	return n;
 }
 
@@ -151,7 +151,7 @@ static double mean_factor(const struct model *m, int n)
 	static const double weight[4] = { .3626837833783620, .3137066458778873,
 		.2223810344533745, .1012285362903763 };
 	struct stage s = stage_new(m, n);
-	double *f = calloc(2 * m->elements, sizeof *f), sum = 0, back = 0;
+	double *f = calloc(2 * m->element.n, sizeof *f), sum = 0, back = 0;
 	double up[3] = { 0, 0, 1 }, frame[3][3];
 
 	assert_non_null(f);
@@ -160,10 +160,10 @@ static double mean_factor(const struct model *m, int n)
 		double eye[3] = { (1 + (x < 4 ? 1 : -1) * node[x % 4]) / 2,
 			          (1 + (y < 4 ? 1 : -1) * node[y % 4]) / 2, 0 };
 		frame_about(up, .3 + i, frame);
-		draw(&s, eye, frame, HEMI_VOID);
-		memset(f, 0, 2 * m->elements * sizeof *f);
-		hemicube_gather(&s.cube, f);
-		for (size_t k = 0; k < m->elements; k++) {
+		draw(&s, eye, frame, HEMICUBE_VOID);
+		memset(f, 0, 2 * m->element.n * sizeof *f);
+		ff_hemicube_sum(&s.cube, f);
+		for (size_t k = 0; k < m->element.n; k++) {
 			sum += weight[x % 4] * weight[y % 4] / 4 * f[2 * k + FRONT];
 			back += f[2 * k + BACK];
 		}
@@ -213,10 +213,10 @@ static void closed_cube_has_no_holes(void **state)
 			for (int c = 0; c < 3; c++)
 				eye[c] = lo[c] + size[k] * rng_uniform(&r);
 			random_frame(&r, frame);
-			draw(&s, eye, frame, HEMI_VOID);
+			draw(&s, eye, frame, HEMICUBE_VOID);
 			assert_int_equal(count_void(&s), 0);
 			for (size_t p = 0; p < s.grid.pixels; p++) {
-				double d = hemicube_distance(&s.cube, p);
+				double d = ff_hemicube_distance(&s.cube, p);
 				assert_int_equal(s.cube.item[p] & 1, FRONT);
 				assert_true(d > 0 && d < 1.75 * size[k]);
 			}
@@ -239,7 +239,7 @@ static void closed_cube_from_its_faces(void **state)
 		struct model m = cube_model(lo, 1);
 		struct stage s = stage_new(&m, 64);
 		for (int i = 0; i < 300; i++) {
-			uint32_t own = (uint32_t)i % 12, *v = &m.element[3 * own];
+			uint32_t own = (uint32_t)i % 12, *v = &m.element.corner[3 * own];
 			const double *a = &m.vertex[3 * v[0]], *b = &m.vertex[3 * v[1]],
 			             *c = &m.vertex[3 * v[2]];
 			double n[3], eye[3], frame[3][3];
@@ -276,8 +276,8 @@ static void near_sheet_blocks(void **state)
 		for (int i = 0; i < 20; i++) {
 			double eye[3] = { .1 + .04 * i, .45, 0 }, frame[3][3], seen[8] = { 0 };
 			frame_about(up, i, frame);
-			draw(&s, eye, frame, HEMI_VOID);
-			hemicube_gather(&s.cube, seen);
+			draw(&s, eye, frame, HEMICUBE_VOID);
+			ff_hemicube_sum(&s.cube, seen);
 			double sheet = seen[0] + seen[1] + seen[2] + seen[3];
 			if (height[k] > 0)
 				assert_true(sheet > 1 - 1e-5 && seen[0] + seen[2] == 0);
@@ -298,16 +298,16 @@ static void equal_depths_give_the_lowest(void **state)
 	(void)state;
 	add_grid(&m, lo, u, v, 1);
 	for (uint32_t i = 0; i < 4; i++) /* the same, wound the other way */
-		add_vertex(&m, m.vertex[3 * i], m.vertex[3 * i + 1], m.vertex[3 * i + 2]);
+		mesh_add_vertex(&m, m.vertex[3 * i], m.vertex[3 * i + 1], m.vertex[3 * i + 2]);
 	add_triangle(&m, 7, 5, 4);
 	add_triangle(&m, 6, 7, 4);
 	struct stage s = stage_new(&m, 64);
 	for (int i = 0; i < 50; i++) {
 		double eye[3] = { rng_uniform(&r), rng_uniform(&r), 0 }, up[3] = { 0, 0, 1 }, frame[3][3];
 		frame_about(up, i, frame);
-		draw(&s, eye, frame, HEMI_VOID);
+		draw(&s, eye, frame, HEMICUBE_VOID);
 		for (size_t p = 0; p < s.grid.pixels; p++)
-			assert_true(s.cube.item[p] == HEMI_VOID || s.cube.item[p] / 2 < 2);
+			assert_true(s.cube.item[p] == HEMICUBE_VOID || s.cube.item[p] / 2 < 2);
 	}
 	stage_free(&s);
 	model_free(&m);
@@ -317,10 +317,10 @@ static void equal_depths_give_the_lowest(void **state)
 static uint32_t cast(const struct model *m, const double eye[3], const double dir[3])
 {
 	double nearest = INFINITY;
-	uint32_t item = HEMI_VOID;
+	uint32_t item = HEMICUBE_VOID;
 
-	for (uint32_t i = 0; i < m->elements; i++) {
-		const uint32_t *v = &m->element[3 * i];
+	for (uint32_t i = 0; i < m->element.n; i++) {
+		const uint32_t *v = &m->element.corner[3 * i];
 		double e1[3], e2[3], p[3], q[3], s[3];
 		v3_sub(&m->vertex[3 * v[1]], &m->vertex[3 * v[0]], e1);
 		v3_sub(&m->vertex[3 * v[2]], &m->vertex[3 * v[0]], e2);
@@ -346,9 +346,9 @@ static struct model soup_model(struct rng *r, size_t triangles, double size)
 		for (int k = 0; k < 3; k++)
 			c[k] = 2 * rng_uniform(r) - 1;
 		for (int j = 0; j < 3; j++)
-			add_vertex(&m, c[0] + size * (rng_uniform(r) - .5),
-			           c[1] + size * (rng_uniform(r) - .5),
-			           c[2] + size * (rng_uniform(r) - .5));
+			mesh_add_vertex(&m, c[0] + size * (rng_uniform(r) - .5),
+			                c[1] + size * (rng_uniform(r) - .5),
+			                c[2] + size * (rng_uniform(r) - .5));
 		uint32_t v = (uint32_t)(3 * i);
 		add_triangle(&m, v, v + 1, v + 2);
 	}
@@ -366,7 +366,7 @@ static void soup_agrees_with_rays(void **state)
 		struct stage s = stage_new(&m, 32);
 		double eye[3] = { .3 * rng_uniform(&r), 0, .2 }, frame[3][3];
 		random_frame(&r, frame);
-		draw(&s, eye, frame, HEMI_VOID);
+		draw(&s, eye, frame, HEMICUBE_VOID);
 		for (size_t p = 0; p < s.grid.pixels; p++) {
 			const double *d = &s.grid.direction[3 * p];
 			double dir[3];
@@ -402,11 +402,11 @@ static void aligned_grid(void **state)
 		if (i == 0)
 			for (int k = 0; k < 9; k++)
 				frame[k / 3][k % 3] = k % 4 == 0;
-		draw(&s, eye, frame, HEMI_VOID);
+		draw(&s, eye, frame, HEMICUBE_VOID);
 		for (size_t p = 0; p < 64 * 64; p++)
-			assert_int_not_equal(s.cube.item[p], HEMI_VOID);
-		double unseen = hemicube_gather(&s.cube, f);
-		for (size_t k = 0; k < 2 * m.elements; k++)
+			assert_int_not_equal(s.cube.item[p], HEMICUBE_VOID);
+		double unseen = ff_hemicube_sum(&s.cube, f);
+		for (size_t k = 0; k < 2 * m.element.n; k++)
 			sum += f[k];
 		assert_true(fabs(sum + unseen - 1) < 1e-12);
 		assert_true(fabs(sum / exact - 1) < (i ? 3e-3 : 2e-2));
@@ -423,9 +423,9 @@ static int32_t bisect(struct model *m, uint32_t triangle, const uint32_t v[3], i
 	int edge = 0;
 
 	if (depth == 0) {
-		m->element_triangle[m->elements] = triangle;
+		m->element.triangle[m->element.n] = triangle;
 		add_triangle(m, v[0], v[1], v[2]);
-		return ~(int32_t)(m->elements - 1);
+		return ~(int32_t)(m->element.n - 1);
 	}
 	for (int k = 0; k < 3; k++) {
 		double d[3];
@@ -436,7 +436,7 @@ static int32_t bisect(struct model *m, uint32_t triangle, const uint32_t v[3], i
 	const double *a = &m->vertex[3 * v[edge]], *b = &m->vertex[3 * v[(edge + 1) % 3]];
 	for (int k = 0; k < 3; k++)
 		middle[k] = (a[k] + b[k]) / 2;
-	uint32_t c = add_vertex(m, middle[0], middle[1], middle[2]);
+	uint32_t c = mesh_add_vertex(m, middle[0], middle[1], middle[2]);
 	uint32_t low[3] = { v[0], v[1], v[2] }, high[3] = { v[0], v[1], v[2] };
 	low[(edge + 1) % 3] = high[edge] = c;
 	int32_t at = (int32_t)m->splits++;
@@ -456,32 +456,32 @@ static void triangles_give_the_same_elements(void **state)
 	size_t differ = 0, pixels = 0;
 
 	(void)state;
-	m.triangle = coarse.element;
-	m.triangles = 12;
-	m.triangle_split = calloc(12, sizeof *m.triangle_split);
+	m.triangle.corner = coarse.element.corner;
+	m.triangle.n = 12;
+	m.triangle.split = calloc(12, sizeof *m.triangle.split);
 	m.split = calloc(ELEMENTS, sizeof *m.split);
-	m.element_triangle = calloc(ELEMENTS, sizeof *m.element_triangle);
-	assert_true(m.triangle_split && m.split && m.element_triangle);
+	m.element.triangle = calloc(ELEMENTS, sizeof *m.element.triangle);
+	assert_true(m.triangle.split && m.split && m.element.triangle);
 	memcpy(m.vertex, coarse.vertex, 24 * sizeof *m.vertex);
 	m.vertices = 8;
 	for (uint32_t t = 0; t < 12; t++)
-		m.triangle_split[t] = bisect(&m, t, &m.triangle[3 * t], DEPTH);
+		m.triangle.split[t] = bisect(&m, t, &m.triangle.corner[3 * t], DEPTH);
 	struct model elements_only = m;
-	elements_only.triangles = 0;
+	elements_only.triangle.n = 0;
 	struct stage s = stage_new(&m, 16), e = stage_new(&elements_only, 16);
 	for (int i = 0; i < 200; i++) {
 		double eye[3], frame[3][3];
 		for (int k = 0; k < 3; k++)
 			eye[k] = lo[k] + 2 * rng_uniform(&r);
-		uint32_t own = i % 2 ? HEMI_VOID : (uint32_t)i * 30;
+		uint32_t own = i % 2 ? HEMICUBE_VOID : (uint32_t)i * 30;
 		random_frame(&r, frame);
 		draw(&s, eye, frame, own);
-		draw(&e, eye, frame, HEMI_VOID);
+		draw(&e, eye, frame, HEMICUBE_VOID);
 		for (size_t p = 0; p < s.grid.pixels; p++) {
 			uint32_t a = s.cube.item[p], b = e.cube.item[p];
-			assert_int_not_equal(b, HEMI_VOID);
-			if (own != HEMI_VOID && m.element_triangle[b >> 1] == m.element_triangle[own])
-				assert_int_equal(a, HEMI_VOID);
+			assert_int_not_equal(b, HEMICUBE_VOID);
+			if (own != HEMICUBE_VOID && m.element.triangle[b >> 1] == m.element.triangle[own])
+				assert_int_equal(a, HEMICUBE_VOID);
 			else
 				differ += a != b;
 		}
@@ -505,7 +505,7 @@ static void same_picture_every_time(void **state)
 		double eye[3] = { .1 * i, 0, 0 }, other[3] = { 0, 0, .5 }, frame[3][3];
 		random_frame(&r, frame);
 		draw(&s, eye, frame, 3);
-		draw(&t, other, frame, HEMI_VOID);
+		draw(&t, other, frame, HEMICUBE_VOID);
 		draw(&t, eye, frame, 3);
 		assert_memory_equal(s.cube.item, t.cube.item, s.grid.pixels * sizeof *s.cube.item);
 		assert_memory_equal(s.cube.depth, t.cube.depth, s.grid.pixels * sizeof *s.cube.depth);
@@ -522,10 +522,10 @@ static void empty_scene_escapes(void **state)
 	double eye[3] = { 0, 0, 0 }, frame[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
 
 	(void)state;
-	draw(&s, eye, frame, HEMI_VOID);
-	assert_true(fabs(hemicube_gather(&s.cube, NULL) - 1) < 1e-14);
+	draw(&s, eye, frame, HEMICUBE_VOID);
+	assert_true(fabs(ff_hemicube_sum(&s.cube, NULL) - 1) < 1e-14);
 	stage_free(&s);
-	hemi_scene_free(NULL);
+	ff_hemicube_scene_free(NULL);
 	model_free(&m);
 }
 

@@ -19,9 +19,9 @@ static void delta_factors_sum_to_one(void **state)
 
 	(void)state;
 	for (size_t k = 0; k < sizeof n / sizeof *n; k++) {
-		struct hemi_grid g;
+		struct hemicube_grid g;
 		long double sum = 0, angle = 0, cosines = 0;
-		assert_int_equal(hemi_grid_init(&g, n[k], &e), 0);
+		assert_int_equal(ff_hemicube_grid_init(&g, n[k], &e), 0);
 		assert_int_equal(g.pixels, 3 * n[k] * n[k]);
 		for (size_t i = 0; i < g.pixels; i++) {
 			sum += g.delta[i];
@@ -32,7 +32,7 @@ static void delta_factors_sum_to_one(void **state)
 		assert_true(fabsl(sum - 1) < 1e-15L);
 		assert_true(fabsl(angle - 2 * acosl(-1)) < 1e-14L);
 		assert_true(fabsl(cosines / acosl(-1) - 1) < 1.L / (n[k] * n[k]));
-		hemi_grid_free(&g);
+		ff_hemicube_grid_free(&g);
 	}
 }
 
@@ -41,12 +41,12 @@ static void delta_factors_are_integrals(void **state)
 {
 	static const double at[3] = { -.7745966692414834, 0, .7745966692414834 };
 	static const double weight[3] = { 5. / 9, 8. / 9, 5. / 9 };
-	struct hemi_grid g;
+	struct hemicube_grid g;
 	struct err e = { 0 };
 	int n = 64;
 
 	(void)state;
-	assert_int_equal(hemi_grid_init(&g, n, &e), 0);
+	assert_int_equal(ff_hemicube_grid_init(&g, n, &e), 0);
 	for (size_t i = 0; i < g.pixels; i += 7) {
 		size_t top = (size_t)(n * n), side = i >= top;
 		size_t in = side ? (i - top) % (top / 2) : i;
@@ -62,7 +62,7 @@ static void delta_factors_are_integrals(void **state)
 		assert_true(fabs(g.delta[i] / sum - 1) < 1e-7);
 		assert_true(fabs(g.solid_angle[i] / angle - 1) < 1e-7);
 	}
-	hemi_grid_free(&g);
+	ff_hemicube_grid_free(&g);
 }
 
 static void lookup_inverts_direction(void **state)
@@ -72,14 +72,14 @@ static void lookup_inverts_direction(void **state)
 
 	(void)state;
 	for (size_t k = 0; k < sizeof n / sizeof *n; k++) {
-		struct hemi_grid g;
+		struct hemicube_grid g;
 		struct rng r = rng_seed(1, k);
-		assert_int_equal(hemi_grid_init(&g, n[k], &e), 0);
+		assert_int_equal(ff_hemicube_grid_init(&g, n[k], &e), 0);
 		for (size_t i = 0; i < g.pixels; i++)
-			assert_int_equal(hemicube_lookup(&g, &g.direction[3 * i]), i);
+			assert_int_equal(ff_hemicube_lookup(&g, &g.direction[3 * i]), i);
 		for (int i = 0; i < 10000; i++) {
 			double d[3] = { rng_uniform(&r) - .5, rng_uniform(&r) - .5, rng_uniform(&r) };
-			size_t p = hemicube_lookup(&g, d);
+			size_t p = ff_hemicube_lookup(&g, d);
 			assert_true(p < g.pixels);
 			v3_normalise(d);
 			assert_true(v3_dot(d, &g.direction[3 * p]) > cos(1.5 / n[k]));
@@ -87,23 +87,23 @@ static void lookup_inverts_direction(void **state)
 		const double edge[][3] = { { 1, 1, 1 }, { -1, -1, -1 }, { 1, 0, 0 }, { 0, -1, 0 },
 			{ -1, 1, 0 }, { 0, 0, 1 }, { 1, -1, 1 }, { 0, 1, -2 } };
 		for (size_t i = 0; i < sizeof edge / sizeof *edge; i++)
-			assert_true(hemicube_lookup(&g, edge[i]) < g.pixels);
-		hemi_grid_free(&g);
+			assert_true(ff_hemicube_lookup(&g, edge[i]) < g.pixels);
+		ff_hemicube_grid_free(&g);
 	}
 }
 
 static void odd_resolution_is_refused(void **state)
 {
-	struct hemi_grid g;
-	static const int n[] = { -2, 0, 1, 7, HEMI_N_MAX + 2 };
+	struct hemicube_grid g;
+	static const int n[] = { -2, 0, 1, 7, HEMICUBE_N_MAX + 2 };
 
 	(void)state;
 	for (size_t i = 0; i < sizeof n / sizeof *n; i++) {
 		struct err e = { 0 };
-		assert_int_equal(hemi_grid_init(&g, n[i], &e), -1);
+		assert_int_equal(ff_hemicube_grid_init(&g, n[i], &e), -1);
 		assert_non_null(strstr(e.text, "even"));
 	}
-	hemi_grid_free(&g);
+	ff_hemicube_grid_free(&g);
 }
 
 int main(void)

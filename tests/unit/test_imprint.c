@@ -22,20 +22,20 @@ static void put(struct model *m, int place)
 /* UVs as a linear function of the place, to be found again after cutting. */
 static void linear_uvs(struct model *m)
 {
-	for (size_t i = 0; i < 3 * m->triangles; i++) {
-		const double *x = &m->vertex[3 * (size_t)m->triangle[i]];
-		m->triangle_uv[2 * i] = (float)(x[0] + 2 * x[1] - x[2]);
-		m->triangle_uv[2 * i + 1] = (float)(x[2] - x[0]);
+	for (size_t i = 0; i < 3 * m->triangle.n; i++) {
+		const double *x = &m->vertex[3 * (size_t)m->triangle.corner[i]];
+		m->triangle.uv[2 * i] = (float)(x[0] + 2 * x[1] - x[2]);
+		m->triangle.uv[2 * i + 1] = (float)(x[2] - x[0]);
 	}
 }
 
 static void check_uvs(const struct model *m, double scale)
 {
-	for (size_t i = 0; i < 3 * m->triangles; i++) {
-		const double *x = &m->vertex[3 * (size_t)m->triangle[i]];
-		assert_true(fabs((double)m->triangle_uv[2 * i] - (x[0] + 2 * x[1] - x[2])) <=
+	for (size_t i = 0; i < 3 * m->triangle.n; i++) {
+		const double *x = &m->vertex[3 * (size_t)m->triangle.corner[i]];
+		assert_true(fabs((double)m->triangle.uv[2 * i] - (x[0] + 2 * x[1] - x[2])) <=
 		            1e-6 * scale);
-		assert_true(fabs((double)m->triangle_uv[2 * i + 1] - (x[2] - x[0])) <= 1e-6 * scale);
+		assert_true(fabs((double)m->triangle.uv[2 * i + 1] - (x[2] - x[0])) <= 1e-6 * scale);
 	}
 }
 
@@ -44,14 +44,14 @@ static double worst_shape(const struct model *m)
 {
 	double worst = 1;
 
-	for (size_t i = 0; i < m->elements; i++) {
+	for (size_t i = 0; i < m->element.n; i++) {
 		double longest = 0, d[3];
 		for (size_t k = 0; k < 3; k++) {
-			v3_sub(&m->vertex[3 * (size_t)m->element[3 * i + k]],
-			       &m->vertex[3 * (size_t)m->element[3 * i + (k + 1) % 3]], d);
+			v3_sub(&m->vertex[3 * (size_t)m->element.corner[3 * i + k]],
+			       &m->vertex[3 * (size_t)m->element.corner[3 * i + (k + 1) % 3]], d);
 			longest = fmax(longest, v3_length(d));
 		}
-		worst = fmin(worst, 2 * m->element_area[i] / (longest * longest));
+		worst = fmin(worst, 2 * m->element.area[i] / (longest * longest));
 	}
 	return worst;
 }
@@ -64,25 +64,25 @@ static void check_no_contacts(const struct model *m, double size)
 		                         .close = 1e-6 * size, .apart = .05 * size,
 		                         .shortest = .55 * size, .fine = .55 * size };
 	struct contacts found = { 0 };
-	struct edges g;
+	struct half_edges g;
 	struct err e = { 0 };
 
-	assert_int_equal(edges_build(&g, m->triangle, m->triangles, m->vertices, &e), 0);
-	assert_int_equal(find_contacts(m, &g, &limits, &found, &e), 0);
+	assert_int_equal(geo_half_edges_build(&g, m->triangle.corner, m->triangle.n, m->vertices, &e), 0);
+	assert_int_equal(mesh_find_contacts(m, &g, &limits, &found, &e), 0);
 	assert_int_equal(found.list.n, 0);
 	free(found.list.data);
-	edges_free(&g);
+	geo_half_edges_free(&g);
 }
 
 /* Meshes with elements of `size`; the area must stay and contacts must be gone. */
-static struct mesher_report mesh(struct model *m, double size)
+static struct mesh_report mesh(struct model *m, double size)
 {
 	double area = input_area(m), reach = 0;
 
 	for (size_t i = 0; i < 3 * m->vertices; i++)
 		reach = fmax(reach, fabs(m->vertex[i]));
 	linear_uvs(m);
-	struct mesher_report r = run(m, sizes(2 * size, size, 0));
+	struct mesh_report r = run(m, sizes(2 * size, size, 0));
 	assert_true(fabs(input_area(m) - area) <= (1e-12 + 1e-14 * reach / r.diagonal) * area);
 	check_uvs(m, reach);
 	check_no_contacts(m, size);
@@ -96,17 +96,17 @@ static double area_within(const struct model *m, uint32_t s, double frame[3][3],
 {
 	double sum = 0;
 
-	for (size_t i = 0; i < m->elements; i++) {
+	for (size_t i = 0; i < m->element.n; i++) {
 		double c[3] = { 0 }, d[3];
-		if (m->triangle_surface[m->element_triangle[i]] != s)
+		if (m->triangle.surface[m->element.triangle[i]] != s)
 			continue;
 		for (size_t k = 0; k < 3; k++)
-			v3_mad(c, 1. / 3, &m->vertex[3 * (size_t)m->element[3 * i + k]], c);
+			v3_mad(c, 1. / 3, &m->vertex[3 * (size_t)m->element.corner[3 * i + k]], c);
 		v3_sub(c, frame[0], d);
 		double x = v3_dot(d, frame[1]) / v3_dot(frame[1], frame[1]);
 		double y = v3_dot(d, frame[2]) / v3_dot(frame[2], frame[2]);
 		if (inside(x, y))
-			sum += m->element_area[i];
+			sum += m->element.area[i];
 	}
 	return sum;
 }
@@ -156,14 +156,14 @@ static void test_footprint(void **state)
 			put(&m, place);
 			frame_of(&m, 0, frame);
 			double unit = v3_length(frame[1]);
-			struct mesher_report r = mesh(&m, .1 * unit);
+			struct mesh_report r = mesh(&m, .1 * unit);
 			assert_int_equal(r.cut, 2);
 			assert_true(r.lines >= 4 && r.lines <= 20);
 			double area = area_within(&m, 0, frame, within_block);
 			if (!one_surface)
 				assert_true(fabs(area - .09 * unit * unit) < 1e-11 * unit * unit);
 			assert_true(worst_shape(&m) > .1);
-			mesher_report_free(&r);
+			mesh_report_free(&r);
 			model_free(&m);
 		}
 }
@@ -179,17 +179,17 @@ static void test_patches_end_at_lines(void **state)
 	add_rectangle(&m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 }, (double[]){ 0, 1, 0 }, 0);
 	add_block(&m, 1);
 	frame_of(&m, 0, frame);
-	struct mesher_report r = run(&m, sizes((double)INFINITY, .1, 0));
+	struct mesh_report r = run(&m, sizes((double)INFINITY, .1, 0));
 	size_t patches = 0;
-	for (size_t p = 0; p < m.patches; p++)
-		patches += m.surface.n && m.patch_surface[p] == 0;
+	for (size_t p = 0; p < m.patch.n; p++)
+		patches += m.surface.n && m.patch.surface[p] == 0;
 	assert_int_equal(patches, 2);
 	assert_true(fabs(area_within(&m, 0, frame, within_block) - .09) < 1e-12);
-	for (size_t p = 0; p < m.patches; p++)
-		if (m.patch_surface[p] == 0)
-			assert_true(fabs(m.patch_area[p] - .09) < 1e-12 ||
-			            fabs(m.patch_area[p] - .91) < 1e-12);
-	mesher_report_free(&r);
+	for (size_t p = 0; p < m.patch.n; p++)
+		if (m.patch.surface[p] == 0)
+			assert_true(fabs(m.patch.area[p] - .09) < 1e-12 ||
+			            fabs(m.patch.area[p] - .91) < 1e-12);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
@@ -213,14 +213,14 @@ static void test_crossing(void **state)
 		put(&m, place);
 		frame_of(&m, 0, frame);
 		double unit = v3_length(frame[1]);
-		struct mesher_report r = mesh(&m, .2 * unit);
+		struct mesh_report r = mesh(&m, .2 * unit);
 		assert_int_equal(r.cut, 4);
 		/* One line through either quad, halved where it crosses the diagonal, and
 		 * once more to keep the pieces in shape. */
 		assert_true(r.lines >= 4 && r.lines <= 6);
 		assert_true(fabs(area_within(&m, 0, frame, left_half) - .37 * unit * unit) <
 		            1e-11 * unit * unit);
-		mesher_report_free(&r);
+		mesh_report_free(&r);
 		model_free(&m);
 	}
 }
@@ -231,7 +231,7 @@ static void test_wall(void **state)
 	(void)state;
 	for (int place = 0; place < PLACES; place++) {
 		struct model m;
-		struct edges g;
+		struct half_edges g;
 		struct err e = { 0 };
 		begin(&m, 2, 0);
 		add_rectangle(&m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 },
@@ -240,21 +240,21 @@ static void test_wall(void **state)
 		              (double[]){ 0, 0, 1 }, 1);
 		put(&m, place);
 		double unit = place == 2 ? 1e-6 : 1;
-		struct mesher_report r = mesh(&m, .2 * unit);
+		struct mesh_report r = mesh(&m, .2 * unit);
 		assert_int_equal(r.cut, 2);
 		/* Both sides of the line are open edges, between the same places. */
-		assert_int_equal(edges_build(&g, m.triangle, m.triangles, m.vertices, &e), 0);
+		assert_int_equal(geo_half_edges_build(&g, m.triangle.corner, m.triangle.n, m.vertices, &e), 0);
 		double open = 0, d[3];
 		for (size_t i = 0; i < g.n; i++) {
 			uint32_t h = g.use[g.start[i]];
-			v3_sub(&m.vertex[3 * (size_t)half_from(m.triangle, h)],
-			       &m.vertex[3 * (size_t)half_to(m.triangle, h)], d);
+			v3_sub(&m.vertex[3 * (size_t)geo_half_edge_from(m.triangle.corner, h)],
+			       &m.vertex[3 * (size_t)geo_half_edge_to(m.triangle.corner, h)], d);
 			if (g.start[i + 1] - g.start[i] == 1)
 				open += v3_length(d);
 		}
 		assert_true(fabs(open - (4 + 2 * .7 + 2 * 1.7) * unit) < 1e-9 * unit);
-		edges_free(&g);
-		mesher_report_free(&r);
+		geo_half_edges_free(&g);
+		mesh_report_free(&r);
 		model_free(&m);
 	}
 }
@@ -267,10 +267,10 @@ static void test_room_is_whole(void **state)
 	(void)state;
 	make_room(&m);
 	transform(&m, 1, 1, 3);
-	struct mesher_report r = run(&m, sizes(.2, .1, 0));
+	struct mesh_report r = run(&m, sizes(.2, .1, 0));
 	assert_int_equal(r.cut, 0);
-	assert_int_equal(m.triangles, 12);
-	mesher_report_free(&r);
+	assert_int_equal(m.triangle.n, 12);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
@@ -286,10 +286,10 @@ static void test_flush(void **state)
 	add_rectangle(&m, (double[]){ .3, .1, 0 }, (double[]){ .2, 0, 0 }, (double[]){ 0, .15, 0 }, 1);
 	add_rectangle(&m, (double[]){ 1, .2, 0 }, (double[]){ 1, 0, 0 }, (double[]){ 0, .5, 0 }, 2);
 	transform(&m, 1, 1, 0);
-	struct mesher_report r = run(&m, sizes(.2, .1, 0));
+	struct mesh_report r = run(&m, sizes(.2, .1, 0));
 	assert_int_equal(r.cut, 1);
 	assert_true(r.lines >= 4 && r.lines <= 8);
-	mesher_report_free(&r);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
@@ -317,12 +317,12 @@ static void test_close(void **state)
 			put(&m, place);
 			frame_of(&m, 0, frame);
 			double unit = v3_length(frame[1]);
-			struct mesher_report r = run(&m, sizes(.2 * unit, .1 * unit, 0));
+			struct mesh_report r = run(&m, sizes(.2 * unit, .1 * unit, 0));
 			assert_int_equal(r.cut, i < 2 ? 2 : 0);
 			if (i < 2)
 				assert_true(fabs(area_within(&m, 0, frame, within_sheet) -
 				                 .12 * unit * unit) < 1e-9 * unit * unit);
-			mesher_report_free(&r);
+			mesh_report_free(&r);
 			model_free(&m);
 		}
 }
@@ -347,17 +347,17 @@ static void test_covered(void **state)
 				              (double[]){ i == 2 ? .01 : .3, 0, 0 },
 				              (double[]){ 0, .4, 0 }, 1);
 			if (i == 3)
-				m.material.tau_d[material_at(&m.material, 1, BACK)] = .1;
+				m.material.tau_d[model_material_at(&m.material, 1, BACK)] = .1;
 			put(&m, place);
 			frame_of(&m, 0, frame);
 			double unit = v3_length(frame[1]);
-			struct mesher_report r = run(&m, sizes(.2 * unit, .1 * unit, 0));
+			struct mesh_report r = run(&m, sizes(.2 * unit, .1 * unit, 0));
 			double gone = i == 3 ? 0 : i == 2 ? .004 : .12;
 			assert_true((r.covered > 0) == (i < 3));
 			assert_int_equal(r.merged > 0, i == 1); /* the floor shows on the sheet's back */
 			double area = input_area(&m) / (unit * unit), given = i == 2 ? 1.004 : 1.12;
 			assert_true(fabs(area - given + gone) < 1e-9);
-			mesher_report_free(&r);
+			mesh_report_free(&r);
 			model_free(&m);
 		}
 }
@@ -372,12 +372,12 @@ static void test_options(void **state)
 		add_rectangle(&m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 },
 		              (double[]){ 0, 1, 0 }, 0);
 		add_block(&m, 1);
-		struct mesher_options o = sizes((double)INFINITY, i == 0 ? (double)INFINITY :
-		                                i == 1 ? 1.5 : .1, 0);
+		struct mesh_options o = sizes((double)INFINITY, i == 0 ? (double)INFINITY :
+		                              i == 1 ? 1.5 : .1, 0);
 		o.no_imprint = i == 2;
-		struct mesher_report r = run(&m, o);
+		struct mesh_report r = run(&m, o);
 		assert_int_equal(r.cut, 0);
-		mesher_report_free(&r);
+		mesh_report_free(&r);
 		model_free(&m);
 	}
 }
@@ -411,9 +411,9 @@ static void test_random(void **state)
 		}
 		put(&m, (int)(seed % 3)); /* not far away: patches may be narrow */
 		double unit = seed % 3 == 2 ? 1e-6 : 1;
-		struct mesher_report r = mesh(&m, .25 * unit);
+		struct mesh_report r = mesh(&m, .25 * unit);
 		cut += r.cut;
-		mesher_report_free(&r);
+		mesh_report_free(&r);
 		model_free(&m);
 	}
 	assert_true(cut > 100);
@@ -436,13 +436,13 @@ static void test_many(void **state)
 		              (double[]){ 0, 0, .2 }, 1);
 	}
 	transform(&m, 1, 1, 0);
-	struct mesher_report r = run(&m, sizes(.2, .1, 0));
+	struct mesh_report r = run(&m, sizes(.2, .1, 0));
 	size_t patches = 0;
-	for (size_t p = 0; p < m.patches; p++)
-		patches += m.patch_surface[p] == 0;
+	for (size_t p = 0; p < m.patch.n; p++)
+		patches += m.patch.surface[p] == 0;
 	assert_int_equal(patches, (N + 1) * (N + 1));
 	check_no_contacts(&m, .1);
-	mesher_report_free(&r);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
@@ -466,11 +466,11 @@ static void test_boxes(void **state)
 					vertex[i][k] = vertex[i - i % 3][k] + .1 * vertex[i][k];
 			triangle[i] = i;
 		}
-		assert_int_equal(boxes_build(&b, vertex[0], triangle, n, &e), 0);
+		assert_int_equal(geo_boxes_build(&b, vertex[0], triangle, n, &e), 0);
 		for (uint32_t i = 0; i < n; i++) {
 			size_t near = 0;
 			found.n = 0;
-			assert_int_equal(boxes_find(&b, &b.box[i], .01, &found, &e), 0);
+			assert_int_equal(geo_boxes_find(&b, &b.box[i], .01, &found, &e), 0);
 			for (uint32_t j = 0; j < n; j++) {
 				int apart = 0;
 				for (int k = 0; k < 3; k++)
@@ -483,7 +483,7 @@ static void test_boxes(void **state)
 			assert_int_equal(near, found.n * 0x10001);
 		}
 		free(found.data);
-		boxes_free(&b);
+		geo_boxes_free(&b);
 	}
 }
 

@@ -14,7 +14,7 @@
 static const double zero[3] = { 0, 0, 0 };
 
 static const struct ff_options rays = { .method = FF_RAYS, .rays = 256, .points = 1,
-	.emitter_gain = 1, .lobe_rays = 256, .depth = 256, .seed = 1, .part = 1, .parts = 1,
+	.emitter_gain = 1, .lobe_rays = 256, .depth = 256, .seed = 1, .shard = 1, .shards = 1,
 	.threads = 2 };
 
 /* Coefficients of light on a side, in each band: rho_d, tau_d, rho_s, tau_s. */
@@ -25,13 +25,13 @@ static void set_side(struct model *m, size_t material, int side, const double c[
 
 	for (int k = 0; k < 4; k++)
 		for (int b = 0; b < mt->bands; b++)
-			to[k][material_at(mt, material, side) + (size_t)b] = c[k];
+			to[k][model_material_at(mt, material, side) + (size_t)b] = c[k];
 }
 
 static void set_emission(struct model *m, size_t material, double x)
 {
 	for (int b = 0; b < m->bands; b++)
-		m->material.emission[material_at(&m->material, material, FRONT) + (size_t)b] = x;
+		m->material.emission[model_material_at(&m->material, material, FRONT) + (size_t)b] = x;
 }
 
 enum { CELLS = 4 };
@@ -146,12 +146,12 @@ static void test_white_band(void **state)
 	room(&m, 0, half, black, 1, 2);
 	for (size_t k = 0; k < 3; k++)
 		for (int side = 0; side < 2; side++)
-			m.material.rho_d[material_at(&m.material, k, side)] = 1;
+			m.material.rho_d[model_material_at(&m.material, k, side)] = 1;
 	solved_begin(&x, &m, &rays, 0);
 	assert_int_equal(solved_shoot(&x, 1e-4), -1);
 	assert_non_null(strstr(x.e.text, "no steady state: light in band 0"));
 	solved_free(&x);
-	m.material.emission[material_at(&m.material, 1, FRONT)] = 0;
+	m.material.emission[model_material_at(&m.material, 1, FRONT)] = 0;
 	assert_balanced(&m, 0, 1e-4, &bound);
 	assert_true(bound < 4e-4);
 	model_free(&m);
@@ -168,12 +168,12 @@ static void test_bright_and_dim(void **state)
 	room(&m, 0, half, half, 1, 1);
 	set_emission(&m, 1, 1e160);
 	solved_join(&x, &m, &rays, NULL);
-	assert_int_equal(solution_begin(&x.s, &m, &x.t, 0, &x.e), -1);
+	assert_int_equal(radiosity_begin(&x.s, &m, &x.t, 0, &x.e), -1);
 	assert_non_null(strstr(x.e.text, "too large to compute with"));
 	solved_free(&x);
 	set_emission(&m, 1, 1e-300);
 	solved_join(&x, &m, &rays, NULL);
-	assert_int_equal(solution_begin(&x.s, &m, &x.t, 0, &x.e), -1);
+	assert_int_equal(radiosity_begin(&x.s, &m, &x.t, 0, &x.e), -1);
 	assert_non_null(strstr(x.e.text, "no emitter"));
 	solved_free(&x);
 	set_emission(&m, 0, 1);

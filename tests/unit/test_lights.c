@@ -23,7 +23,7 @@
 static const double zero[3] = { 0, 0, 0 }, one[3] = { 1, 1, 1 };
 
 static const struct ff_options options = { .method = FF_RAYS, .rays = 4096, .points = 1,
-	.emitter_gain = 8, .lobe_rays = 4096, .depth = 256, .seed = 1, .part = 1, .parts = 1,
+	.emitter_gain = 8, .lobe_rays = 4096, .depth = 256, .seed = 1, .shard = 1, .shards = 1,
 	.threads = 2 };
 
 /* ---- scenes ---- */
@@ -36,7 +36,7 @@ static void add_light(struct model *m, enum light_kind kind, double x, double y,
 	struct lights *l = &m->light;
 	double at[3] = { x, y, z };
 
-	assert_int_equal(lights_new(l, 1, m->bands, &e), 0);
+	assert_int_equal(model_lights_new(l, 1, m->bands, &e), 0);
 	l->name[0] = strdup("lamp");
 	l->kind[0] = (uint8_t)kind;
 	for (int k = 0; k < 3; k++) {
@@ -55,7 +55,7 @@ static void set(struct model *m, size_t material, double rho_d, int two_sided)
 {
 	m->material.one_sided[material] = !two_sided;
 	for (int side = 0; side <= two_sided; side++)
-		m->material.rho_d[material_at(&m->material, material, side)] = rho_d;
+		m->material.rho_d[model_material_at(&m->material, material, side)] = rho_d;
 }
 
 /* The rectangle [x0,x1] x [y0,y1] at height z, front up or down. */
@@ -93,12 +93,12 @@ static void solve(const struct model *m, struct solution *s)
 	struct radiosity_report r;
 
 	memory_ff(m, &options, &f, &stats);
-	assert_int_equal(transport_init(&t, m, shard, name, 1, 2, &e), 0);
-	assert_int_equal(solution_begin(s, m, &t, 0, &e), 0);
+	assert_int_equal(radiosity_transport_init(&t, m, shard, name, 1, 2, &e), 0);
+	assert_int_equal(radiosity_begin(s, m, &t, 0, &e), 0);
 	assert_int_equal(radiosity_shoot(s, &t, &ro, NULL, &r, &e), 0);
-	assert_int_equal(radiosity_gather(s, &t, 2, &r, &e), 0);
+	assert_int_equal(radiosity_element_irradiance(s, &t, 2, &r, &e), 0);
 	assert_true(r.residual <= 1e-12);
-	transport_free(&t);
+	radiosity_transport_free(&t);
 	ff_free(&f);
 }
 
@@ -108,9 +108,9 @@ static double arrived(const struct model *m, const struct solution *s, uint32_t 
 {
 	double sum = 0;
 
-	for (uint32_t i = m->patch_start[ps >> 1]; i < m->patch_start[(ps >> 1) + 1]; i++) {
+	for (uint32_t i = m->patch.start[ps >> 1]; i < m->patch.start[(ps >> 1) + 1]; i++) {
 		size_t es = 2 * (size_t)i + (ps & 1);
-		sum += m->element_area[i] *
+		sum += m->element.area[i] *
 		       (part ? part[es * (size_t)m->bands] : solution_irradiance(s, es, 0));
 	}
 	return sum;
@@ -146,7 +146,7 @@ static void rays_carry_the_flux(void **state)
 	for (uint32_t i = 0; i < RAYS; i++) {
 		double u[3] = { rng_sobol(i, 0, 7), rng_sobol(i, 1, 7), rng_sobol(i, 2, 7) };
 		double org[3], dir[3];
-		light_ray(&m.light, 0, u, 0, org, dir);
+		model_light_ray(&m.light, 0, u, 0, org, dir);
 		double c = v3_dot(dir, m.light.direction);
 		near(v3_length(dir), 1, 1e-12);
 		assert_true(c >= cos(outer) - 1e-12);
@@ -177,15 +177,15 @@ static double direct(const struct model *m, double x, double y)
 	struct err e = { 0 };
 	double at[3] = { x, y, 0 }, nothing = 0, h = 0, error;
 	struct ray_scene *rays = ray_scene_new(m, &e);
-	struct direct *d = direct_new(m, rays, &e);
-	struct direct_worker *w = direct_worker_new(d, &e);
+	struct direct *d = occ_direct_new(m, rays, &e);
+	struct direct_worker *w = occ_direct_worker_new(d, &e);
 
 	assert_non_null(w);
-	direct_begin(w, 0);
-	assert_int_equal(direct_at(w, at, 1, 1e-3, &nothing, &h, &error, &e), 0);
+	occ_direct_begin(w, 0);
+	assert_int_equal(occ_direct_at(w, at, 1, 1e-3, &nothing, &h, &error, &e), 0);
 	assert_true(error == 0);
-	direct_worker_free(w);
-	direct_free(d);
+	occ_direct_worker_free(w);
+	occ_direct_free(d);
 	ray_scene_free(rays);
 	return h;
 }
@@ -200,9 +200,9 @@ static void point_above_a_floor(void **state)
 	near(direct(&m, .1, .2), 1, 1e-12);
 	near(direct(&m, 1.1, 1.2), pow(3, -1.5), 1e-12); /* I cos^3 / h^2 */
 	solve(&m, &s);
-	near(arrived(&m, &s, 0, s.direct), angle(-2.1, 1.9, -2.2, 1.8, 1), 1e-6);
+	near(arrived(&m, &s, 0, s.irradiance.direct), angle(-2.1, 1.9, -2.2, 1.8, 1), 1e-6);
 	near(ledger(&s, LEDGER_EMITTED), 4 * PI, 1e-12);
-	near(s.error[0], 0, 0);
+	near(s.error.sampling[0], 0, 0);
 	solution_free(&s);
 	model_free(&m);
 }
@@ -256,8 +256,8 @@ static void directional_on_a_floor(void **state)
 	floor_with(&m, LIGHT_DIRECTIONAL, slanting, 0, 0);
 	near(direct(&m, 1, 1), 2 / sqrt(5), 1e-12);
 	solve(&m, &s);
-	for (size_t i = 0; i < m.elements; i++)
-		near(s.direct[2 * i], 2 / sqrt(5), 1e-6);
+	for (size_t i = 0; i < m.element.n; i++)
+		near(s.irradiance.direct[2 * i], 2 / sqrt(5), 1e-6);
 	near(ledger(&s, LEDGER_EMITTED), 16 * 2 / sqrt(5), 1e-9);
 	solution_free(&s);
 	model_free(&m);
@@ -316,14 +316,14 @@ static void through_a_pane(void **state)
 	set(&m, 0, 0, 1);
 	set(&m, 1, 0, 1);
 	for (int side = 0; side < 2; side++)
-		m.material.tau_s[material_at(&m.material, 1, side)] = .8;
+		m.material.tau_s[model_material_at(&m.material, 1, side)] = .8;
 	put(&m, 8, 0, 0, 1, 0, 1, 0, 0);
 	put(&m, 8, 1, -3, 3, -3, 3, .5, 0);
 	add_light(&m, LIGHT_POINT, .5, .5, 1, NULL, 0, 0);
 	grid_end(&m);
 	solve(&m, &s);
-	near(arrived(&m, &s, 0, s.caustic), .8 * angle(-.5, .5, -.5, .5, 1), 2e-4);
-	near(arrived(&m, &s, 0, s.direct), 0, 0);
+	near(arrived(&m, &s, 0, s.irradiance.caustic), .8 * angle(-.5, .5, -.5, .5, 1), 2e-4);
+	near(arrived(&m, &s, 0, s.irradiance.direct), 0, 0);
 	near(ledger(&s, LEDGER_ESCAPED), 4 * PI - .2 * angle(-3.5, 2.5, -3.5, 2.5, .5) -
 	     .8 * angle(-.5, .5, -.5, .5, 1), 1e-3);
 	solution_free(&s);
@@ -340,15 +340,15 @@ static void by_a_mirror(void **state)
 	grid_new(&m, 2, 4, 2, 1);
 	set(&m, 0, 0, 0);
 	m.material.one_sided[1] = 1;
-	m.material.rho_s[material_at(&m.material, 1, FRONT)] = .8;
+	m.material.rho_s[model_material_at(&m.material, 1, FRONT)] = .8;
 	put(&m, 4, 0, .5, 2, 0, 1.5, 1, 1);
 	put(&m, 4, 1, -9, 9, -9, 9, 0, 0);
 	add_light(&m, LIGHT_POINT, 0, 0, 1, NULL, 0, 0);
 	grid_end(&m);
 	solve(&m, &s);
 	double want = .8 * angle(.5, 2, 0, 1.5, 2);
-	near(arrived(&m, &s, 0, s.caustic), want, 5e-4 * want);
-	near(arrived(&m, &s, 0, s.direct), 0, 0);
+	near(arrived(&m, &s, 0, s.irradiance.caustic), want, 5e-4 * want);
+	near(arrived(&m, &s, 0, s.irradiance.direct), 0, 0);
 	solution_free(&s);
 	model_free(&m);
 }
@@ -380,7 +380,7 @@ static void furnace(void **state)
 		sum += arrived(&m, &s, 2 * p, NULL);
 	near(sum, 4 * PI / .25, 1e-6);
 	near(ledger(&s, LEDGER_ESCAPED), 0, 0);
-	near(arrived(&m, &s, 8, s.direct), angle(-.3, .7, -.4, .6, .6), 1e-6);
+	near(arrived(&m, &s, 8, s.irradiance.direct), angle(-.3, .7, -.4, .6, .6), 1e-6);
 	solution_free(&s);
 	model_free(&m);
 }
@@ -416,11 +416,11 @@ static void dark_light_is_no_emitter(void **state)
 	box_with(&m, .5, .3, .4, .6);
 	m.light.intensity[0] = 0;
 	memory_ff(&m, &options, &f, &stats);
-	assert_int_equal(transport_init(&t, &m, shard, name, 1, 1, &e), 0);
-	assert_int_equal(solution_begin(&s, &m, &t, 0, &e), -1);
+	assert_int_equal(radiosity_transport_init(&t, &m, shard, name, 1, 1, &e), 0);
+	assert_int_equal(radiosity_begin(&s, &m, &t, 0, &e), -1);
 	assert_non_null(strstr(e.text, "no emitter"));
 	solution_free(&s);
-	transport_free(&t);
+	radiosity_transport_free(&t);
 	ff_free(&f);
 	model_free(&m);
 }
@@ -441,7 +441,7 @@ static void particles_agree(void **state)
 	grid_new(&m, 6, 4, 2, 1);
 	set(&m, 0, 0, 0);
 	set(&m, 1, 0, 0);
-	m.material.rho_s[material_at(&m.material, 1, FRONT)] = .6;
+	m.material.rho_s[model_material_at(&m.material, 1, FRONT)] = .6;
 	m.material.alpha[2] = 20;
 	grid_box(&m, 4, material, zero, one);
 	add_light(&m, LIGHT_POINT, .3, .4, .6, NULL, 0, 0);
@@ -454,9 +454,9 @@ static void particles_agree(void **state)
 	near(h.emitted[0], 4 * PI, 1e-12);
 	for (uint32_t ps = 0; ps < 12; ps += 2) {
 		double flux = 0, variance = 0;
-		for (uint32_t i = m.patch_start[ps >> 1]; i < m.patch_start[(ps >> 1) + 1]; i++) {
-			flux += h.h[2 * i] * m.element_area[i];
-			variance += pow(h.error[2 * i] * m.element_area[i], 2);
+		for (uint32_t i = m.patch.start[ps >> 1]; i < m.patch.start[(ps >> 1) + 1]; i++) {
+			flux += h.h[2 * i] * m.element.area[i];
+			variance += pow(h.error[2 * i] * m.element.area[i], 2);
 		}
 		double got = arrived(&m, &s, ps, NULL);
 		near(got, flux, 4 * sqrt(variance) + .005 * flux);
@@ -503,11 +503,11 @@ static void any_threads_any_shards(void **state)
 	memory_ff(&m, &o, &f[1], &stats);
 	assert_int_equal(f[0].entries, f[1].entries);
 	assert_memory_equal(f[0].value, f[1].value, f[0].entries * sizeof *f[0].value);
-	o.parts = 2;
-	for (o.part = 1; o.part <= 2; o.part++)
-		memory_ff(&m, &o, &f[1 + o.part], &stats);
-	assert_int_equal(f[2].rows + f[3].rows, f[0].rows);
-	assert_int_equal(f[3].row_kind[f[3].rows - 1], FF_LIGHT);
+	o.shards = 2;
+	for (o.shard = 1; o.shard <= 2; o.shard++)
+		memory_ff(&m, &o, &f[1 + o.shard], &stats);
+	assert_int_equal(f[2].row.n + f[3].row.n, f[0].row.n);
+	assert_int_equal(f[3].row.kind[f[3].row.n - 1], FF_LIGHT);
 	for (int i = 0; i < 4; i++)
 		ff_free(&f[i]);
 	model_free(&m);
@@ -524,7 +524,7 @@ static void in_a_corner(void **state)
 	grid_new(&m, 3, 4, 2, 1);
 	set(&m, 0, 0, 0);
 	m.material.one_sided[1] = 1;
-	m.material.rho_s[material_at(&m.material, 1, FRONT)] = .8;
+	m.material.rho_s[model_material_at(&m.material, 1, FRONT)] = .8;
 	put(&m, 4, 0, 1.5, 2.5, 0, 1, 2, 1);
 	put(&m, 4, 1, 0, 9, -9, 9, 0, 0);
 	grid_quad(&m, 4, 1, o, y, z);
@@ -534,8 +534,8 @@ static void in_a_corner(void **state)
 	double direct = angle(.5, 1.5, 0, 1, 1), wall = angle(2.5, 3.5, 0, 1, 1);
 	double below = angle(.5, 1.5, 0, 1, 3), both = angle(2.5, 3.5, 0, 1, 3);
 	double want = .8 * (wall + below) + .64 * both;
-	near(arrived(&m, &s, 0, s.direct), direct, 1e-6);
-	near(arrived(&m, &s, 0, s.caustic), want, 2e-3 * want);
+	near(arrived(&m, &s, 0, s.irradiance.direct), direct, 1e-6);
+	near(arrived(&m, &s, 0, s.irradiance.caustic), want, 2e-3 * want);
 	solution_free(&s);
 	model_free(&m);
 }

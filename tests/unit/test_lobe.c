@@ -114,7 +114,7 @@ static void test_normaliser_table(void **state)
 	(void)state;
 	for (size_t i = 0; i < COUNT(normaliser); i++)
 		for (int j = 0; j < ANGLES; j++)
-			assert_close(lobe_normaliser(normaliser[i].k, cosine(angle[j])),
+			assert_close(bsdf_lobe_normaliser(normaliser[i].k, cosine(angle[j])),
 			             normaliser[i].value[j], 1e-12);
 }
 
@@ -153,11 +153,11 @@ static void test_normaliser_any_exponent(void **state)
 	for (double l = -3; l <= 8; l += .37)
 		for (int i = 1; i <= 40; i++) {
 			double k = pow(10, l), c = i <= 20 ? cos(i * pi / 42) : pow(10, -.4 * (i - 20));
-			assert_close(lobe_normaliser(k, c), slow_normaliser(k, c), 1e-12);
+			assert_close(bsdf_lobe_normaliser(k, c), slow_normaliser(k, c), 1e-12);
 		}
 	for (double k = 0; k <= 1e8; k = 3 * k + .1) {
-		assert_close(lobe_normaliser(k, 1), 2 * pi / (k + 1), 1e-14);
-		assert_close(lobe_normaliser(k, 0), pi / (k + 1), 1e-14);
+		assert_close(bsdf_lobe_normaliser(k, 1), 2 * pi / (k + 1), 1e-14);
+		assert_close(bsdf_lobe_normaliser(k, 0), pi / (k + 1), 1e-14);
 	}
 }
 
@@ -166,10 +166,10 @@ static void test_table(void **state)
 	(void)state;
 	for (double k = 0; k <= 1e8; k = 2 * k + .7) {
 		struct lobe_table t;
-		lobe_table_make(&t, k);
+		bsdf_lobe_table_make(&t, k);
 		for (int i = 0; i <= 1000; i++) {
 			double c = fmin(1, i * .008 / sqrt(k + 1));
-			assert_close(lobe_table_normaliser(&t, c), lobe_normaliser(k, c), 1e-5);
+			assert_close(bsdf_lobe_table_normaliser(&t, c), bsdf_lobe_normaliser(k, c), 1e-5);
 		}
 	}
 }
@@ -177,11 +177,11 @@ static void test_table(void **state)
 static void test_power(void **state)
 {
 	(void)state;
-	assert_true(lobe_power(0, 1e-300) == 1 && lobe_power(0, 0) == 0);
-	assert_true(lobe_power(2.5, -.5) == 0 && lobe_power(2.5, 0) == 0);
-	assert_true(lobe_power(1e8, 1) == 1 && lobe_power(3, 1 + 1e-15) == 1);
-	assert_true(lobe_power(1e8, .5) == 0);
-	assert_close(lobe_power(2.5, .3), pow(.3, 2.5), 1e-14);
+	assert_true(bsdf_lobe_power(0, 1e-300) == 1 && bsdf_lobe_power(0, 0) == 0);
+	assert_true(bsdf_lobe_power(2.5, -.5) == 0 && bsdf_lobe_power(2.5, 0) == 0);
+	assert_true(bsdf_lobe_power(1e8, 1) == 1 && bsdf_lobe_power(3, 1 + 1e-15) == 1);
+	assert_true(bsdf_lobe_power(1e8, .5) == 0);
+	assert_close(bsdf_lobe_power(2.5, .3), pow(.3, 2.5), 1e-14);
 }
 
 static void test_albedo_table(void **state)
@@ -189,7 +189,7 @@ static void test_albedo_table(void **state)
 	(void)state;
 	for (size_t i = 0; i < COUNT(albedo); i++)
 		for (int j = 0; j < ANGLES; j++)
-			assert_close(lobe_albedo(albedo[i].k, cosine(angle[j])),
+			assert_close(bsdf_lobe_albedo(albedo[i].k, cosine(angle[j])),
 			             albedo[i].value[j], 1e-4);
 }
 
@@ -206,7 +206,7 @@ static double slow_albedo(double k, double theta)
 			double t = lo + (i + .5) * step, ring = 0;
 			for (int j = 0; j < TURN; j++) {
 				double phi = (j + .5) * pi / TURN;
-				ring += lobe_power(k, c * cos(t) + s * sin(t) * cos(phi));
+				ring += bsdf_lobe_power(k, c * cos(t) + s * sin(t) * cos(phi));
 			}
 			sum += ring * fmin(1, cos(t) / c) * sin(t) * step;
 		}
@@ -221,11 +221,11 @@ static void test_albedo(void **state)
 	(void)state;
 	for (size_t i = 0; i < COUNT(k); i++)
 		for (size_t j = 0; j < COUNT(theta); j++)
-			assert_close(lobe_albedo(k[i], cosine(theta[j])),
+			assert_close(bsdf_lobe_albedo(k[i], cosine(theta[j])),
 			             slow_albedo(k[i], theta[j] * pi / 180), 1e-6);
 	for (double x = 0; x <= 1e6; x = 3 * x + .3) {
-		assert_close(lobe_albedo(x, 1), (x + 1) / (x + 2), 1e-6);
-		assert_close(lobe_albedo(x, 0), .5, 1e-6);
+		assert_close(bsdf_lobe_albedo(x, 1), (x + 1) / (x + 2), 1e-6);
+		assert_close(bsdf_lobe_albedo(x, 0), .5, 1e-6);
 	}
 }
 
@@ -244,9 +244,9 @@ static void test_sample_whole(void **state)
 		double mean = 0, square = 0;
 		for (int s = 0; s < N; s++) {
 			double u[2] = { rng_uniform(&r), rng_uniform(&r) }, w[3];
-			lobe_sample_whole(k[i], axis, u, w);
+			bsdf_lobe_sample_whole(k[i], axis, u, w);
 			assert_true(fabs(v3_dot(w, w) - 1) < 1e-14);
-			double x = lobe_power(k[i] + 1, v3_dot(axis, w));
+			double x = bsdf_lobe_power(k[i] + 1, v3_dot(axis, w));
 			mean += x / N;
 			square += x * x / N;
 		}
@@ -264,8 +264,8 @@ static void test_sample_clipped(void **state)
 		for (int s = 0; s < 2000; s++) {
 			double axis[3] = { sin(deg * pi / 180), 0, cosine(deg) }, w[3], again[3];
 			double u[2] = { rng_sobol((uint32_t)s, 0, 1), rng_sobol((uint32_t)s, 1, 1) };
-			lobe_sample(deg * deg, axis, n, u, w);
-			lobe_sample(deg * deg, axis, n, u, again);
+			bsdf_lobe_sample(deg * deg, axis, n, u, w);
+			bsdf_lobe_sample(deg * deg, axis, n, u, again);
 			assert_true(w[2] > 0 && v3_dot(axis, w) > 0);
 			assert_memory_equal(w, again, sizeof w);
 		}
@@ -274,9 +274,9 @@ static void test_sample_clipped(void **state)
 	for (int i = 0; i < 4; i++) {
 		u[0] = i & 1 ? 1 - 0x1p-53 : 0;
 		u[1] = i & 2 ? 1 - 0x1p-53 : 0;
-		lobe_sample(1e8, low, n, u, w);
+		bsdf_lobe_sample(1e8, low, n, u, w);
 		assert_true(isfinite(w[0] + w[1] + w[2]) && w[2] >= 0);
-		lobe_sample_cosine(n, u, w);
+		bsdf_sample_cosine(n, u, w);
 		assert_true(isfinite(w[0] + w[1] + w[2]) && w[2] > 0);
 	}
 }
@@ -287,7 +287,7 @@ static void test_mirror(void **state)
 	double r[3];
 
 	(void)state;
-	lobe_mirror(l, n, r);
+	bsdf_lobe_mirror(l, n, r);
 	assert_true(fabs(r[0] + .6) < 1e-15 && r[1] == 0 && fabs(r[2] - .8) < 1e-15);
 }
 

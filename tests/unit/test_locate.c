@@ -18,19 +18,19 @@ static void agree(struct model *m, double patch, double element)
 	struct rng r = rng_seed(1, 2);
 	size_t other = 0, tries = 20000;
 
-	struct mesher_report report = run(m, sizes(patch, element, 1));
-	mesher_report_free(&report);
-	assert_int_equal(locator_init(&l, m, &e), 0);
+	struct mesh_report report = run(m, sizes(patch, element, 1));
+	mesh_report_free(&report);
+	assert_int_equal(ray_locator_init(&l, m, &e), 0);
 	for (size_t i = 0; i < tries; i++) {
-		uint32_t t = (uint32_t)(rng_next(&r) % m->triangles);
+		uint32_t t = (uint32_t)(rng_next(&r) % m->triangle.n);
 		double a = sqrt(rng_uniform(&r)), b = rng_uniform(&r);
 		double w[3] = { 1 - a, a * (1 - b), a * b }, tree[3] = { w[0], w[1], w[2] };
-		uint32_t found = locate(&l, t, (float)w[1], (float)w[2]);
-		assert_int_equal(m->element_triangle[found], t);
+		uint32_t found = ray_locate(&l, t, (float)w[1], (float)w[2]);
+		assert_int_equal(m->element.triangle[found], t);
 		other += found != model_locate(m, t, tree);
 	}
 	assert_true(other < tries / 1000);
-	locator_free(&l);
+	ray_locator_free(&l);
 	model_free(m);
 }
 

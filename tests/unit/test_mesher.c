@@ -12,41 +12,41 @@
 static void test_square(void **state)
 {
 	struct model m;
-	struct mesher_report r;
+	struct mesh_report r;
 
 	(void)state;
 	make_square(&m);
 	r = run(&m, sizes(.25, .25, 0));
-	assert_int_equal(m.patches, 16);
+	assert_int_equal(m.patch.n, 16);
 	assert_int_equal(r.planar_patches, 16);
-	for (size_t p = 0; p < m.patches; p++) {
-		assert_int_equal(m.patch_loop[p + 1], p + 1);
-		assert_int_equal(m.loop_start[p + 1] - m.loop_start[p], 4);
-		assert_true(fabs(m.patch_area[p] - 1. / 16) < 1e-15);
+	for (size_t p = 0; p < m.patch.n; p++) {
+		assert_int_equal(m.patch.loop[p + 1], p + 1);
+		assert_int_equal(m.patch.loop_start[p + 1] - m.patch.loop_start[p], 4);
+		assert_true(fabs(m.patch.area[p] - 1. / 16) < 1e-15);
 	}
-	assert_int_equal(m.elements, 64);
+	assert_int_equal(m.element.n, 64);
 	assert_true(r.area_back == r.area_front);
 	assert_int_equal(r.open_edges, 4);
 	assert_int_equal(r.components, 1);
 	assert_int_equal(r.closed_components, 0);
 	assert_int_equal(r.two_sided, 1);
-	mesher_report_free(&r);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
 static void test_unbounded(void **state)
 {
 	struct model m;
-	struct mesher_report r;
+	struct mesh_report r;
 
 	(void)state;
 	make_square(&m);
 	r = run(&m, sizes((double)INFINITY, (double)INFINITY, 1));
-	assert_int_equal(m.patches, 1);
-	assert_int_equal(m.elements, 2);
+	assert_int_equal(m.patch.n, 1);
+	assert_int_equal(m.element.n, 2);
 	assert_int_equal(m.splits, 0);
-	assert_int_equal(m.loop_indices, 4);
-	mesher_report_free(&r);
+	assert_int_equal(m.patch.loop_indices, 4);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
@@ -63,14 +63,14 @@ static void test_rectangles(void **state)
 		add_rectangle(&m, (double[]){ 1, 2, 3 }, (double[]){ 0, 0, length[i] },
 		              (double[]){ 1, 0, 0 }, 0);
 		transform(&m, 1, 1, 0);
-		struct mesher_report r = run(&m, sizes(.5, .2, 0));
-		assert_int_equal(m.patches, i == 2 ? 16 : 8);
-		double even = length[i] / (double)m.patches;
-		for (size_t p = 0; p < m.patches; p++)
-			assert_true(fabs(m.patch_area[p] - even) < (i == 2 ? .1 * even : 1e-12));
+		struct mesh_report r = run(&m, sizes(.5, .2, 0));
+		assert_int_equal(m.patch.n, i == 2 ? 16 : 8);
+		double even = length[i] / (double)m.patch.n;
+		for (size_t p = 0; p < m.patch.n; p++)
+			assert_true(fabs(m.patch.area[p] - even) < (i == 2 ? .1 * even : 1e-12));
 		if (i < 2)
-			assert_int_equal(m.loop_indices, 4 * m.patches);
-		mesher_report_free(&r);
+			assert_int_equal(m.patch.loop_indices, 4 * m.patch.n);
+		mesh_report_free(&r);
 		model_free(&m);
 	}
 }
@@ -78,12 +78,12 @@ static void test_rectangles(void **state)
 static void test_cube(void **state)
 {
 	struct model m;
-	struct mesher_report r;
+	struct mesh_report r;
 
 	(void)state;
 	make_cube(&m);
 	r = run(&m, sizes((double)INFINITY, (double)INFINITY, 0));
-	assert_int_equal(m.patches, 6);
+	assert_int_equal(m.patch.n, 6);
 	assert_int_equal(r.planar_patches, 6);
 	assert_int_equal(r.components, 1);
 	assert_int_equal(r.closed_components, 1);
@@ -91,7 +91,7 @@ static void test_cube(void **state)
 	assert_true(fabs(r.area_front - 6) < 1e-14);
 	assert_true(r.area_back == 0);
 	assert_int_equal(m.vertices, 8);
-	mesher_report_free(&r);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
@@ -99,17 +99,17 @@ static void test_cube(void **state)
 static void test_room(void **state)
 {
 	struct model m;
-	struct mesher_report r;
+	struct mesh_report r;
 
 	(void)state;
 	make_room(&m);
 	r = run(&m, sizes(.05, .04, 1));
-	assert_int_equal(m.patches, 6 * 256);
-	assert_int_equal(m.elements, 6 * 1024);
+	assert_int_equal(m.patch.n, 6 * 256);
+	assert_int_equal(m.element.n, 6 * 1024);
 	assert_int_equal(r.total.welded, 12);
 	assert_int_equal(r.components, 1);
 	assert_int_equal(r.closed_components, 1);
-	mesher_report_free(&r);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
@@ -120,66 +120,66 @@ static void make_l_shape(struct model *m)
 
 	begin(m, 1, 0);
 	for (int i = 0; i < 4; i++)
-		add_vertex(m, outer[i][0], outer[i][1], 0);
+		mesh_add_vertex(m, outer[i][0], outer[i][1], 0);
 	for (int i = 0; i < 4; i++)
-		add_vertex(m, .25 + .5 * outer[i][0], .25 + .5 * outer[i][1], 0);
+		mesh_add_vertex(m, .25 + .5 * outer[i][0], .25 + .5 * outer[i][1], 0);
 	for (uint32_t i = 0; i < 4; i++)
 		add_quad(m, i, (i + 1) % 4, 4 + (i + 1) % 4, 4 + i, 0);
-	add_vertex(m, 2, 0, 0);
-	add_vertex(m, 2, 1, 0);
+	mesh_add_vertex(m, 2, 0, 0);
+	mesh_add_vertex(m, 2, 1, 0);
 	add_quad(m, 1, 8, 9, 2, 0);
-	add_vertex(m, 1, 2, 0);
-	add_vertex(m, 0, 2, 0);
+	mesh_add_vertex(m, 1, 2, 0);
+	mesh_add_vertex(m, 0, 2, 0);
 	add_quad(m, 3, 2, 10, 11, 0);
 }
 
 static void test_l_shape(void **state)
 {
 	struct model m;
-	struct mesher_report r;
+	struct mesh_report r;
 
 	(void)state;
 	make_l_shape(&m);
 	r = run(&m, sizes((double)INFINITY, .1, 0));
-	assert_int_equal(m.patches, 1);
-	assert_int_equal(m.loops, 2);
-	assert_int_equal(m.loop_start[1], 6);
-	assert_int_equal(m.loop_start[2], 10);
-	assert_true(fabs(m.patch_area[0] - 2.75) < 1e-12);
-	mesher_report_free(&r);
+	assert_int_equal(m.patch.n, 1);
+	assert_int_equal(m.patch.loops, 2);
+	assert_int_equal(m.patch.loop_start[1], 6);
+	assert_int_equal(m.patch.loop_start[2], 10);
+	assert_true(fabs(m.patch.area[0] - 2.75) < 1e-12);
+	mesh_report_free(&r);
 	model_free(&m);
 
 	make_l_shape(&m);
 	transform(&m, 1, 1, 0);
 	r = run(&m, sizes(.25, .1, 0));
-	assert_int_equal(r.planar_patches, m.patches);
-	assert_in_range(m.patches, 44, 60);
-	mesher_report_free(&r);
+	assert_int_equal(r.planar_patches, m.patch.n);
+	assert_in_range(m.patch.n, 44, 60);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
 static void test_sphere(void **state)
 {
 	struct model m;
-	struct mesher_report r;
+	struct mesh_report r;
 
 	(void)state;
 	make_sphere(&m, 5);
-	assert_int_equal(m.triangles, 20480);
+	assert_int_equal(m.triangle.n, 20480);
 	r = run(&m, sizes((double)INFINITY, (double)INFINITY, 0));
-	assert_int_equal(m.elements, 20480);
+	assert_int_equal(m.element.n, 20480);
 	assert_int_equal(m.vertices, 10242);
-	assert_in_range(m.patches, 33, 160); /* a sphere has 33 cones of 20 degrees */
+	assert_in_range(m.patch.n, 33, 160); /* a sphere has 33 cones of 20 degrees */
 	assert_true(r.planar_patches < 10); /* left-over single facets */
 	assert_int_equal(r.closed_components, 1);
-	mesher_report_free(&r);
+	mesh_report_free(&r);
 	model_free(&m);
 
 	make_sphere(&m, 3);
 	r = run(&m, sizes(.17, .1, 0)); /* facets of .15 get patches of their own */
-	assert_int_equal(r.planar_patches, m.patches);
-	assert_int_equal(m.patches, 1280);
-	mesher_report_free(&r);
+	assert_int_equal(r.planar_patches, m.patch.n);
+	assert_int_equal(m.patch.n, 1280);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
@@ -188,14 +188,14 @@ static void test_cylinder(void **state)
 {
 	enum { AROUND = 64, ALONG = 32 };
 	struct model m;
-	struct mesher_report r;
+	struct mesh_report r;
 
 	(void)state;
 	begin(&m, 1, 1);
 	for (int j = 0; j <= ALONG; j++)
 		for (int i = 0; i < AROUND; i++) {
 			double a = 2 * acos(-1) * i / AROUND;
-			add_vertex(&m, .05 * cos(a), .05 * sin(a), 2. * j / ALONG);
+			mesh_add_vertex(&m, .05 * cos(a), .05 * sin(a), 2. * j / ALONG);
 		}
 	for (uint32_t j = 0; j < ALONG; j++)
 		for (uint32_t i = 0; i < AROUND; i++) {
@@ -204,8 +204,8 @@ static void test_cylinder(void **state)
 			         AROUND * j + AROUND + i, 0);
 		}
 	r = run(&m, sizes((double)INFINITY, (double)INFINITY, 0));
-	assert_in_range(m.patches, 9, 18);
-	mesher_report_free(&r);
+	assert_in_range(m.patch.n, 9, 18);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
@@ -228,20 +228,20 @@ static void test_invariance(void **state)
 			else
 				make_sphere(&m, 4);
 			transform(&m, t[i].scale, t[i].turn, t[i].offset);
-			struct mesher_report r = run(&m, sizes(.11, .043, 1));
+			struct mesh_report r = run(&m, sizes(.11, .043, 1));
 			if (i == 0) {
-				patches[shape] = m.patches;
-				elements[shape] = m.elements;
+				patches[shape] = m.patch.n;
+				elements[shape] = m.element.n;
 			}
 			assert_int_equal(r.total.degenerate + r.total.duplicate, 0);
 			if (t[i].offset == 0 || shape == 0) {
 				/* AABB diagonals turn with the scene only for scale. */
 				if (!t[i].turn) {
-					assert_int_equal(m.patches, patches[shape]);
-					assert_int_equal(m.elements, elements[shape]);
+					assert_int_equal(m.patch.n, patches[shape]);
+					assert_int_equal(m.element.n, elements[shape]);
 				}
 			}
-			mesher_report_free(&r);
+			mesh_report_free(&r);
 			model_free(&m);
 		}
 }
@@ -252,7 +252,7 @@ static void test_rotation(void **state)
 	(void)state;
 	for (int shape = 0; shape < 3; shape++) {
 		struct model m[2];
-		struct mesher_report r[2];
+		struct mesh_report r[2];
 		for (int turn = 0; turn < 2; turn++) {
 			if (shape == 0)
 				make_room(&m[turn]);
@@ -263,11 +263,11 @@ static void test_rotation(void **state)
 			transform(&m[turn], 1, turn, 0);
 			r[turn] = run(&m[turn], sizes(.11, .043, 0));
 		}
-		assert_int_equal(m[0].elements, m[1].elements);
+		assert_int_equal(m[0].element.n, m[1].element.n);
 		if (shape < 2)
-			assert_int_equal(m[0].patches, m[1].patches);
+			assert_int_equal(m[0].patch.n, m[1].patch.n);
 		for (int turn = 0; turn < 2; turn++) {
-			mesher_report_free(&r[turn]);
+			mesh_report_free(&r[turn]);
 			model_free(&m[turn]);
 		}
 	}
@@ -284,32 +284,32 @@ static int compare_doubles(const void *pa, const void *pb)
 static void test_permuted(void **state)
 {
 	struct model m[2];
-	struct mesher_report r[2];
+	struct mesh_report r[2];
 	struct rng g = rng_seed(3, 0);
 
 	(void)state;
 	for (int i = 0; i < 2; i++)
 		make_sphere(&m[i], 4);
-	for (size_t t = m[1].triangles - 1; t > 0; t--) {
+	for (size_t t = m[1].triangle.n - 1; t > 0; t--) {
 		size_t other = rng_next(&g) % (t + 1);
 		for (size_t k = 0; k < 3; k++) {
-			uint32_t swap = m[1].triangle[3 * t + k];
-			m[1].triangle[3 * t + k] = m[1].triangle[3 * other + k];
-			m[1].triangle[3 * other + k] = swap;
+			uint32_t swap = m[1].triangle.corner[3 * t + k];
+			m[1].triangle.corner[3 * t + k] = m[1].triangle.corner[3 * other + k];
+			m[1].triangle.corner[3 * other + k] = swap;
 		}
 	}
 	for (int i = 0; i < 2; i++)
 		r[i] = run(&m[i], sizes(.3, .1, 0));
-	assert_int_equal(m[0].patches, m[1].patches);
-	assert_int_equal(m[0].elements, m[1].elements);
-	for (size_t p = 0; p < m[0].patches; p++)
-		assert_true(fabs(m[0].patch_area[p] - m[1].patch_area[p]) < 1e-14);
+	assert_int_equal(m[0].patch.n, m[1].patch.n);
+	assert_int_equal(m[0].element.n, m[1].element.n);
+	for (size_t p = 0; p < m[0].patch.n; p++)
+		assert_true(fabs(m[0].patch.area[p] - m[1].patch.area[p]) < 1e-14);
 	for (int i = 0; i < 2; i++)
-		qsort(m[i].element_area, m[i].elements, sizeof(double), compare_doubles);
-	for (size_t i = 0; i < m[0].elements; i++)
-		assert_true(m[0].element_area[i] == m[1].element_area[i]);
+		qsort(m[i].element.area, m[i].element.n, sizeof(double), compare_doubles);
+	for (size_t i = 0; i < m[0].element.n; i++)
+		assert_true(m[0].element.area[i] == m[1].element.area[i]);
 	for (int i = 0; i < 2; i++) {
-		mesher_report_free(&r[i]);
+		mesh_report_free(&r[i]);
 		model_free(&m[i]);
 	}
 }
@@ -320,15 +320,15 @@ static void make_soup(struct model *m, size_t n)
 
 	begin(m, 1, 0);
 	m->vertex = malloc(9 * n * sizeof *m->vertex);
-	m->triangle = malloc(3 * n * sizeof *m->triangle);
-	m->triangle_surface = calloc(n, sizeof *m->triangle_surface);
+	m->triangle.corner = malloc(3 * n * sizeof *m->triangle.corner);
+	m->triangle.surface = calloc(n, sizeof *m->triangle.surface);
 	m->vertices = 3 * n;
-	m->triangles = n;
+	m->triangle.n = n;
 	for (size_t t = 0; t < n; t++) {
 		double at[3] = { rng_uniform(&g), rng_uniform(&g), rng_uniform(&g) };
 		for (size_t i = 0; i < 9; i++) {
 			m->vertex[9 * t + i] = at[i % 3] + .01 * rng_uniform(&g);
-			m->triangle[3 * t + i / 3] = (uint32_t)(3 * t + i / 3);
+			m->triangle.corner[3 * t + i / 3] = (uint32_t)(3 * t + i / 3);
 		}
 	}
 }
@@ -336,21 +336,21 @@ static void make_soup(struct model *m, size_t n)
 static void test_soup(void **state)
 {
 	struct model m;
-	struct mesher_report r = { 0 };
+	struct mesh_report r = { 0 };
 	struct err e = { 0 };
-	struct mesher_options o = sizes(.05, .04, 1);
+	struct mesh_options o = sizes(.05, .04, 1);
 
 	(void)state;
 	make_soup(&m, 100000);
 	clock_t begun = clock();
-	assert_int_equal(mesher_run(&m, &o, &r, &e), 0);
+	assert_int_equal(mesh_run(&m, &o, &r, &e), 0);
 	double seconds = (double)(clock() - begun) / CLOCKS_PER_SEC;
 	print_message("100k loose triangles: %.2f s\n", seconds);
 #ifndef __SANITIZE_ADDRESS__
 	assert_true(seconds < 2);
 #endif
-	assert_in_range(m.elements, 100000 - 10, 100000);
-	mesher_report_free(&r);
+	assert_in_range(m.element.n, 100000 - 10, 100000);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
@@ -362,13 +362,13 @@ static void test_element_within_patch(void **state)
 	(void)state;
 	for (int i = 0; i < 2; i++) {
 		struct model m;
-		struct mesher_options o = sizes(patch[i], .25, 0);
+		struct mesh_options o = sizes(patch[i], .25, 0);
 		make_square(&m);
 		o.element_within_patch = 1;
-		struct mesher_report r = run(&m, o);
+		struct mesh_report r = run(&m, o);
 		assert_true(r.element_size == (i ? .25 : .125));
-		assert_int_equal(m.patches, i ? 1 : 64);
-		mesher_report_free(&r);
+		assert_int_equal(m.patch.n, i ? 1 : 64);
+		mesh_report_free(&r);
 		model_free(&m);
 	}
 }
@@ -376,15 +376,15 @@ static void test_element_within_patch(void **state)
 static void test_too_fine(void **state)
 {
 	struct model m;
-	struct mesher_report r = { 0 };
+	struct mesh_report r = { 0 };
 	struct err e = { 0 };
-	struct mesher_options o = sizes(.1, 1e-7, 0);
+	struct mesh_options o = sizes(.1, 1e-7, 0);
 
 	(void)state;
 	make_square(&m);
-	assert_int_equal(mesher_run(&m, &o, &r, &e), -1);
+	assert_int_equal(mesh_run(&m, &o, &r, &e), -1);
 	assert_non_null(strstr(e.text, "element size"));
-	mesher_report_free(&r);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 

@@ -10,7 +10,7 @@
 static void test_sliver(void **state)
 {
 	struct model m;
-	struct mesher_report r;
+	struct mesh_report r;
 
 	(void)state;
 	for (int turn = 0; turn < 2; turn++) {
@@ -23,13 +23,13 @@ static void test_sliver(void **state)
 		              (double[]){ 0, 1, 0 }, 2);
 		transform(&m, 1, turn, 0);
 		r = run(&m, sizes(.5, .25, 0));
-		assert_int_equal(m.triangles, 6);
+		assert_int_equal(m.triangle.n, 6);
 		assert_int_equal(r.total.degenerate, 0);
 		assert_int_equal(r.total.duplicate, 0);
 		assert_int_equal(r.components, 1);
 		assert_int_equal(r.open_edges, 8);
 		assert_true(fabs(r.area_front - 2.000001) < 1e-12);
-		mesher_report_free(&r);
+		mesh_report_free(&r);
 		model_free(&m);
 	}
 }
@@ -37,8 +37,8 @@ static void test_sliver(void **state)
 static void test_degenerate(void **state)
 {
 	struct model m;
-	struct mesher_report r;
-	struct mesher_options o = sizes(.5, .5, 0);
+	struct mesh_report r;
+	struct mesh_options o = sizes(.5, .5, 0);
 	struct err e = { 0 };
 
 	(void)state;
@@ -46,28 +46,28 @@ static void test_degenerate(void **state)
 	begin(&m, 2, 0);
 	add_rectangle(&m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 }, (double[]){ 0, 1, 0 }, 0);
 	for (int i = 0; i < 4; i++) /* float32 positions that mean to be collinear */
-		add_vertex(&m, (double)(.1f * (float)i), (double)(.2f * (float)i),
-		           (double)(.3f * (float)i));
+		mesh_add_vertex(&m, (double)(.1f * (float)i), (double)(.2f * (float)i),
+		                (double)(.3f * (float)i));
 	add_triangle(&m, 4, 5, 7, 1);
 	add_triangle(&m, 5, 5, 6, 1);
 	add_triangle(&m, 5, 6, 5, 1);
 	add_triangle(&m, 0, 1, 3, 1);
 	r = run(&m, o);
 	/* The last one was no copy of a square's half, cut along the other diagonal. */
-	assert_int_equal(m.triangles, 3);
+	assert_int_equal(m.triangle.n, 3);
 	assert_int_equal(r.total.degenerate, 3);
 	assert_int_equal(r.surface[1].degenerate, 3);
 	assert_int_equal(r.total.duplicate, 0);
-	assert_true(m.triangle_uv[6 * 2] == 5);
-	mesher_report_free(&r);
+	assert_true(m.triangle.uv[6 * 2] == 5);
+	mesh_report_free(&r);
 	model_free(&m);
 
 	begin(&m, 1, 0);
-	add_vertex(&m, 1, 2, 3);
+	mesh_add_vertex(&m, 1, 2, 3);
 	add_triangle(&m, 0, 0, 0, 0);
-	assert_int_equal(mesher_run(&m, &(struct mesher_options){ 0 }, &r, &e), -1);
+	assert_int_equal(mesh_run(&m, &(struct mesh_options){ 0 }, &r, &e), -1);
 	assert_non_null(strstr(e.text, "no geometry"));
-	mesher_report_free(&r);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
@@ -88,16 +88,16 @@ static void test_duplicates(void **state)
 				for (int i = 0; i < 2; i++)
 					add_rectangle(&m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 },
 					              (double[]){ 0, 1, 0 }, 0);
-				m.triangles = 2;
+				m.triangle.n = 2;
 				for (size_t i = 12; i < 24; i++)
 					m.vertex[i] += i % 5 > 1 ? 2e-7 : 0;
 				add_quad(&m, 4 + q[0], 4 + q[1], 4 + q[2], 4 + q[3], (uint32_t)other);
-				struct mesher_report r = run(&m, sizes((double)INFINITY, .5, 0));
-				assert_int_equal(m.triangles, 2);
+				struct mesh_report r = run(&m, sizes((double)INFINITY, .5, 0));
+				assert_int_equal(m.triangle.n, 2);
 				assert_int_equal(r.total.duplicate, 2);
-				assert_int_equal(m.patches, 1);
+				assert_int_equal(m.patch.n, 1);
 				assert_int_equal(r.merged, one_sided && opposite ? 2 : 0);
-				assert_int_equal(m.patch_surface[0], 0);
+				assert_int_equal(m.patch.surface[0], 0);
 				uint32_t material = model_patch_material(&m, 0);
 				if (one_sided && opposite) {
 					assert_int_equal(m.material.one_sided[material], 0);
@@ -107,7 +107,7 @@ static void test_duplicates(void **state)
 				} else {
 					assert_int_equal(material, 0);
 				}
-				mesher_report_free(&r);
+				mesh_report_free(&r);
 				model_free(&m);
 			}
 }
@@ -116,7 +116,7 @@ static void test_duplicates(void **state)
 static void test_partial_sandwich(void **state)
 {
 	struct model m;
-	struct mesher_report r;
+	struct mesh_report r;
 
 	(void)state;
 	begin(&m, 2, 1);
@@ -129,26 +129,26 @@ static void test_partial_sandwich(void **state)
 	assert_string_equal(m.surface.name[2], "s0|s1");
 	assert_int_equal(m.material.n, 3);
 	assert_string_equal(m.material.name[2], "s0|s1");
-	assert_int_equal(m.patches, 2);
+	assert_int_equal(m.patch.n, 2);
 	assert_true(fabs(r.area_front - 2) < 1e-15 && fabs(r.area_back - 1) < 1e-15);
-	mesher_report_free(&r);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
 static void test_winding(void **state)
 {
 	struct model m;
-	struct mesher_report r;
+	struct mesh_report r;
 
 	(void)state;
 	make_cube(&m);
-	uint32_t swap = m.triangle[1];
-	m.triangle[1] = m.triangle[2];
-	m.triangle[2] = swap;
+	uint32_t swap = m.triangle.corner[1];
+	m.triangle.corner[1] = m.triangle.corner[2];
+	m.triangle.corner[2] = swap;
 	r = run(&m, sizes((double)INFINITY, (double)INFINITY, 0));
 	assert_int_equal(r.surface[0].opposite, 3);
-	assert_int_equal(m.patches, 7);
-	mesher_report_free(&r);
+	assert_int_equal(m.patch.n, 7);
+	mesh_report_free(&r);
 	model_free(&m);
 }
 
@@ -165,10 +165,10 @@ static void test_weld(void **state)
 		              (double[]){ 0, 1, 0 }, 0);
 		add_rectangle(&m, (double[]){ 1 + gap[i], 0, 0 }, (double[]){ 1, 0, 0 },
 		              (double[]){ 0, 1, 0 }, 0);
-		struct mesher_report r = run(&m, sizes((double)INFINITY, .3, 0));
+		struct mesh_report r = run(&m, sizes((double)INFINITY, .3, 0));
 		assert_int_equal(r.surface[0].welded, i ? 0 : 2);
-		assert_int_equal(m.patches, i ? 2 : 1);
-		mesher_report_free(&r);
+		assert_int_equal(m.patch.n, i ? 2 : 1);
+		mesh_report_free(&r);
 		model_free(&m);
 	}
 }

@@ -21,13 +21,13 @@ struct stage {
 static void stage_end(struct stage *t, double direct, double caustic, double indirect)
 {
 	struct err e = { 0 };
-	size_t n = 2 * t->m.elements * (size_t)t->m.bands;
+	size_t n = 2 * t->m.element.n * (size_t)t->m.bands;
 
 	grid_end(&t->m);
 	grid_solution(&t->m, indirect, &t->s);
 	for (size_t i = 0; i < n; i++) {
-		t->s.direct[i] = direct;
-		t->s.caustic[i] = caustic;
+		t->s.irradiance.direct[i] = direct;
+		t->s.irradiance.caustic[i] = caustic;
 	}
 	assert_non_null(t->rays = ray_scene_new(&t->m, &e));
 }
@@ -53,8 +53,8 @@ static struct image render(const struct stage *t, enum view_method method, const
 	struct view_scene *v = view_scene_new(&t->m, &t->s, t->rays, method, threads, &e);
 
 	assert_non_null(v);
-	assert_int_equal(camera_look_at(eye, target, up, 70, &c, &e), 0);
-	assert_int_equal(camera_frame(&c, width, height, &f, &e), 0);
+	assert_int_equal(picture_camera_look_at(eye, target, up, 70, &c, &e), 0);
+	assert_int_equal(picture_camera_frame(&c, width, height, &f, &e), 0);
 	assert_int_equal(view_render(v, &f, &o, NULL, &im, &stats, &e), 0);
 	view_scene_free(v);
 	return im;
@@ -67,7 +67,7 @@ static double look(const struct stage *t, enum view_method method, double ex, do
 	struct image im = render(t, method, eye, target, 1, 1, 1);
 	double v = (double)im.pixel[0];
 
-	image_free(&im);
+	picture_image_free(&im);
 	return v;
 }
 
@@ -75,7 +75,7 @@ static void set(struct model *m, size_t material, double rho_d, double tau_d, do
                 double emission)
 {
 	for (int side = 0; side < 2; side++) {
-		size_t at = material_at(&m->material, material, side);
+		size_t at = model_material_at(&m->material, material, side);
 		m->material.rho_d[at] = rho_d;
 		m->material.tau_d[at] = tau_d;
 		m->material.rho_s[at] = rho_s;
@@ -113,7 +113,7 @@ static void test_furnace(void **state)
 		struct image im = render(&t, k, eye, target, 40, 30, 1);
 		for (size_t p = 0; p < 3 * 40 * 30; p++)
 			assert_true(fabs((double)im.pixel[p] * PI - 1) < 2e-6);
-		image_free(&im);
+		picture_image_free(&im);
 	}
 	stage_free(&t);
 }
@@ -125,14 +125,14 @@ static void test_threads(void **state)
 	(void)state;
 
 	furnace(&t);
-	for (size_t i = 0; i < t.m.elements; i++)
-		t.s.indirect[2 * i] = 1 + sin((double)i);
+	for (size_t i = 0; i < t.m.element.n; i++)
+		t.s.irradiance.indirect[2 * i] = 1 + sin((double)i);
 	for (enum view_method k = VIEW_MESH; k <= VIEW_GATHER; k++) {
 		struct image a = render(&t, k, eye, target, 50, 37, 1);
 		struct image b = render(&t, k, eye, target, 50, 37, 4);
 		assert_memory_equal(a.pixel, b.pixel, 3 * 50 * 37 * sizeof *a.pixel);
-		image_free(&a);
-		image_free(&b);
+		picture_image_free(&a);
+		picture_image_free(&b);
 	}
 	stage_free(&t);
 }
@@ -214,7 +214,7 @@ static void test_gathered(void **state)
 	stage_end(&t, 0, 0, 0);
 	size_t wall = 2 * 8 * 8;
 	for (size_t i = wall; i < 2 * wall; i++)
-		t.s.indirect[2 * i] = t.s.indirect[2 * i + 1] = 1;
+		t.s.irradiance.indirect[2 * i] = t.s.irradiance.indirect[2 * i + 1] = 1;
 	for (double x = -1.8; x < 2; x += .31) {
 		double factor = .5 * (1 - (2 - x) / hypot(2 - x, 50));
 		double got = look(&t, VIEW_GATHER, x - .1, .3, 1, x, .3, 0);
@@ -243,23 +243,23 @@ static void test_target(void **state)
 	stage_end(&t, .2, .3, .5);
 	struct view_scene *v = view_scene_new(&t.m, &t.s, t.rays, VIEW_DIRECT, 1, &e);
 	assert_non_null(v);
-	assert_int_equal(camera_look_at(eye, target, up, 70, &c, &e), 0);
-	assert_int_equal(camera_frame(&c, WIDE, HIGH, &f, &e), 0);
+	assert_int_equal(picture_camera_look_at(eye, target, up, 70, &c, &e), 0);
+	assert_int_equal(picture_camera_frame(&c, WIDE, HIGH, &f, &e), 0);
 	assert_int_equal(view_render(v, &f, &o, NULL, &b, &all, &e), 0);
 	o.relative = .1;
 	assert_int_equal(view_render(v, &f, &o, NULL, &a, &some, &e), 0);
 	assert_true(some.rays < all.rays / 4 && some.rays >= 4 * PIXELS);
 	double off = 0, stated = 0;
 	for (size_t i = 0; i < PIXELS; i++) {
-		double d = (double)(image_plane(&a, 0)[i] - image_plane(&b, 0)[i]);
-		double s = (double)image_plane(&a, 3)[i];
+		double d = (double)(picture_image_plane(&a, 0)[i] - picture_image_plane(&b, 0)[i]);
+		double s = (double)picture_image_plane(&a, 3)[i];
 		off += d * d;
 		stated += s * s;
 		assert_true(s >= 0);
 	}
 	assert_true(stated > off / 9 && stated < off * 9);
-	image_free(&a);
-	image_free(&b);
+	picture_image_free(&a);
+	picture_image_free(&b);
 	view_scene_free(v);
 	stage_free(&t);
 }

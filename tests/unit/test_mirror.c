@@ -18,7 +18,7 @@ static const double rho = .8, tau = .5;
 struct room {
 	struct model m;
 	struct ray_scene *rays;
-	struct light_ways ways;
+	struct light_visibility ways;
 };
 
 /* Black one-sided floors, mirrors and two-sided panes; one light of intensity 1. */
@@ -30,10 +30,10 @@ static void room_new(struct room *r, size_t surfaces, enum light_kind kind, cons
 	grid_new(m, surfaces, 2, MATERIALS, 1);
 	for (size_t i = 0; i < MATERIALS; i++)
 		m->material.one_sided[i] = i != PANE;
-	m->material.rho_s[material_at(&m->material, MIRROR, FRONT)] = rho;
+	m->material.rho_s[model_material_at(&m->material, MIRROR, FRONT)] = rho;
 	for (int side = 0; side < 2; side++)
-		m->material.tau_s[material_at(&m->material, PANE, side)] = tau;
-	assert_int_equal(lights_new(&m->light, 1, 1, &e), 0);
+		m->material.tau_s[model_material_at(&m->material, PANE, side)] = tau;
+	assert_int_equal(model_lights_new(&m->light, 1, 1, &e), 0);
 	m->light.name[0] = strdup("lamp");
 	m->light.kind[0] = (uint8_t)kind;
 	memcpy(kind == LIGHT_DIRECTIONAL ? m->light.direction : m->light.position, at,
@@ -56,12 +56,12 @@ static void room_ready(struct room *r)
 	grid_end(&r->m);
 	r->rays = ray_scene_new(&r->m, &e);
 	assert_non_null(r->rays);
-	assert_int_equal(light_ways_new(&r->m, r->rays, &r->ways, &e), 0);
+	assert_int_equal(ray_light_visibility_new(&r->m, r->rays, &r->ways, &e), 0);
 }
 
 static void room_free(struct room *r)
 {
-	light_ways_free(&r->ways);
+	ray_light_visibility_free(&r->ways);
 	ray_scene_free(r->rays);
 	model_free(&r->m);
 }
@@ -78,8 +78,8 @@ static double irradiance(const struct room *r, double x, double y)
 	for (size_t i = 0; i < l->n; i++) {
 		struct light_sight s;
 		double value = l->intensity[i];
-		light_see(l, i, at, ray_offset(r->rays), &s);
-		if (light_way(&r->ways, i, from, &s, &value, &rays))
+		model_light_see(l, i, at, ray_offset(r->rays), &s);
+		if (ray_light_visibility(&r->ways, i, from, &s, &value, &rays))
 			sum += value * s.across * s.falloff * fmax(0, s.toward[2]);
 	}
 	return sum;

@@ -30,7 +30,7 @@ static void set(struct model *m, size_t material, int side, double rho_d, double
                 double rho_s, double tau_s)
 {
 	for (size_t b = 0; b < (size_t)m->bands; b++) {
-		size_t at = material_at(&m->material, material, side) + b;
+		size_t at = model_material_at(&m->material, material, side) + b;
 		m->material.rho_d[at] = rho_d;
 		m->material.tau_d[at] = tau_d;
 		m->material.rho_s[at] = rho_s;
@@ -42,7 +42,7 @@ static void set(struct model *m, size_t material, int side, double rho_d, double
 static void emit(struct model *m, size_t material, int side, double exitance)
 {
 	for (size_t b = 0; b < (size_t)m->bands; b++)
-		m->material.emission[material_at(&m->material, material, side) + b] = exitance / pi;
+		m->material.emission[model_material_at(&m->material, material, side) + b] = exitance / pi;
 }
 
 static void ready(struct scene *s)
@@ -103,9 +103,9 @@ static double patch_mean(const struct scene *s, const struct pathtrace_irradianc
 	double mean = 0;
 
 	*error = 0;
-	for (size_t e = s->m.patch_start[patch]; e < s->m.patch_start[patch + 1]; e++) {
+	for (size_t e = s->m.patch.start[patch]; e < s->m.patch.start[patch + 1]; e++) {
 		size_t at = (2 * e + (size_t)side) * (size_t)s->m.bands + (size_t)band;
-		double share = s->m.element_area[e] / s->m.patch_area[patch];
+		double share = s->m.element.area[e] / s->m.patch.area[patch];
 		mean += share * h->h[at];
 		*error += share * h->error[at];
 	}
@@ -134,12 +134,12 @@ static void take_picture(const struct scene *s, const double eye[3], const doubl
 
 	if (direction[0] == 0 && direction[2] == 0)
 		up[1] = 0, up[0] = 1;
-	assert_int_equal(camera_look_at(eye, target, up, 60, &c, &e), 0);
+	assert_int_equal(picture_camera_look_at(eye, target, up, 60, &c, &e), 0);
 	if (half_extent > 0) {
 		c.orthographic = 1;
 		c.xmag = c.ymag = half_extent;
 	}
-	assert_int_equal(camera_frame(&c, 12, 12, &f, &e), 0);
+	assert_int_equal(picture_camera_frame(&c, 12, 12, &f, &e), 0);
 	assert_int_equal(pathtrace_picture(s->p, &f, &o, NULL, im, NULL, &e), 0);
 }
 
@@ -151,8 +151,8 @@ static double picture_mean(const struct image *im, const char *name, double *err
 	double sum = 0, squares = 0;
 
 	strcat(other, name);
-	const float *value = image_plane(im, image_channel(im, name));
-	const float *spread = image_plane(im, image_channel(im, other));
+	const float *value = picture_image_plane(im, picture_image_channel(im, name));
+	const float *spread = picture_image_plane(im, picture_image_channel(im, other));
 	for (size_t i = 0; i < n; i++) {
 		sum += value[i];
 		squares += (double)spread[i] * spread[i];
@@ -171,7 +171,7 @@ static void check_picture(const struct scene *s, const double eye[3], const doub
 	mean = picture_mean(&im, "R", &error);
 	check("picture", mean, expected, error, relative);
 	assert_true(error < .05 * expected + 1e-30);
-	image_free(&im);
+	picture_image_free(&im);
 }
 
 /* ---- closed cavities ---- */
@@ -201,7 +201,7 @@ static void test_furnace(void **state)
 			check_patch(&s, &h, patch, FRONT, b, 1 / (1 - rho[b]));
 	for (int b = 0; b < 3; b++) {
 		assert_true(fabs(h.emitted[b] - 6) < 1e-12 && h.escaped[b] == 0);
-		for (size_t e = 0; e < s.m.elements; e++)
+		for (size_t e = 0; e < s.m.element.n; e++)
 			assert_true(h.h[(2 * e + BACK) * 3 + (size_t)b] == 0);
 	}
 	take_picture(&s, inside, corner, 0, 64, &im);
@@ -210,7 +210,7 @@ static void test_furnace(void **state)
 		check(name[b], mean, 1 / (1 - rho[b]) / pi, error, 0);
 		assert_true(error < .02 * mean);
 	}
-	image_free(&im);
+	picture_image_free(&im);
 	pathtrace_irradiance_free(&h);
 	done(&s);
 }
@@ -261,11 +261,11 @@ static void test_isolated(void **state)
 	run_particles(&s, 200000, &h);
 	for (size_t patch = 6; patch < 12; patch++)
 		check_patch(&s, &h, patch, FRONT, 0, 2);
-	for (size_t e = 0; e < s.m.elements; e++) {
-		double one = h.emitted[0] / 200000 / s.m.element_area[e];
+	for (size_t e = 0; e < s.m.element.n; e++) {
+		double one = h.emitted[0] / 200000 / s.m.element.area[e];
 		assert_true(h.h[2 * e + BACK] == 0);
 		assert_true(fabs(h.error[2 * e + BACK] / one - 1) < 1e-12);
-		if (e < s.m.patch_start[6])
+		if (e < s.m.patch.start[6])
 			assert_true(h.h[2 * e] == 0);
 	}
 	assert_true(h.escaped[0] == 0);
@@ -369,9 +369,9 @@ static void test_open_lobe(void **state)
 	s.m.material.emission_exponent[2] = 1e8;
 	ready(&s);
 	run_particles(&s, 400000, &h);
-	in = patch_mean(&s, &h, 0, FRONT, 0, &error) * s.m.patch_area[0];
-	out = patch_mean(&s, &h, 2, FRONT, 0, &error) * s.m.patch_area[2];
-	check("fraction", out / in, 0.033307015494622394, error * s.m.patch_area[2] / in, 1e-3);
+	in = patch_mean(&s, &h, 0, FRONT, 0, &error) * s.m.patch.area[0];
+	out = patch_mean(&s, &h, 2, FRONT, 0, &error) * s.m.patch.area[2];
+	check("fraction", out / in, 0.033307015494622394, error * s.m.patch.area[2] / in, 1e-3);
 	pathtrace_irradiance_free(&h);
 	done(&s);
 }
@@ -453,7 +453,7 @@ static void test_reciprocal_both_ways(void **state)
 	eye = picture_mean(&im, "R", &spread);
 	check("both ways", eye, light, hypot(spread, .6 / pi * error), 0);
 	assert_true(spread < .02 * eye);
-	image_free(&im);
+	picture_image_free(&im);
 	pathtrace_irradiance_free(&h);
 	done(&s);
 }
@@ -565,8 +565,8 @@ static void test_threads(void **state)
 
 	(void)state;
 	plates(&s, 10);
-	assert_int_equal(camera_look_at(eye, target, (double[]){ 0, 1, 0 }, 90, &c, &e), 0);
-	assert_int_equal(camera_frame(&c, 15, 11, &f, &e), 0);
+	assert_int_equal(picture_camera_look_at(eye, target, (double[]){ 0, 1, 0 }, 90, &c, &e), 0);
+	assert_int_equal(picture_camera_frame(&c, 15, 11, &f, &e), 0);
 	for (int i = 0; i < 2; i++) {
 		struct pathtrace_options o = { .samples = 333, .seed = 7, .threads = 1 + 2 * i };
 		double relative;
@@ -575,12 +575,12 @@ static void test_threads(void **state)
 		assert_int_equal(pathtrace_picture(s.p, &f, &o, NULL, &im[i], &relative, &e), 0);
 		assert_true(relative > 0 && isfinite(relative));
 	}
-	size_t rows = 2 * s.m.elements;
+	size_t rows = 2 * s.m.element.n;
 	assert_memory_equal(h[0].h, h[1].h, rows * sizeof(double));
 	assert_memory_equal(h[0].error, h[1].error, rows * sizeof(double));
 	assert_memory_equal(im[0].pixel, im[1].pixel, 6 * 15 * 11 * sizeof(float));
 	for (int i = 0; i < 2; i++) {
-		image_free(&im[i]);
+		picture_image_free(&im[i]);
 		pathtrace_irradiance_free(&h[i]);
 	}
 	done(&s);

@@ -23,7 +23,7 @@ static struct facet facet_of(int n, const double *v)
 {
 	struct facet f = { .n = n, .v = v };
 
-	facet_measure(&f);
+	geo_facet_measure(&f);
 	return f;
 }
 
@@ -31,7 +31,7 @@ static double fraction(int n, const double *a, int k, const double *b)
 {
 	struct facet f = facet_of(n, a), g = facet_of(k, b);
 
-	return contour_exchange(&f, &g) / f.area;
+	return geo_contour_exchange(&f, &g) / f.area;
 }
 
 /* ---- points ---- */
@@ -45,9 +45,9 @@ static void test_point(void **state)
 	const double near[] = { 0, 0, 1e-6, 0, 1, 1e-6, 1, 0, 1e-6 };
 
 	(void)state;
-	assert_near(contour_point((double[]){ 1, 0, 0 }, up, 4, wall), .05573419700255350161, 1e-16);
-	assert_near(contour_point((double[]){ .1, .2, 0 }, up, 3, tri), .11295688744816556648, 1e-16);
-	assert_near(contour_point((double[]){ third, third, 0 }, up, 3, near),
+	assert_near(geo_contour_point((double[]){ 1, 0, 0 }, up, 4, wall), .05573419700255350161, 1e-16);
+	assert_near(geo_contour_point((double[]){ .1, .2, 0 }, up, 3, tri), .11295688744816556648, 1e-16);
+	assert_near(geo_contour_point((double[]){ third, third, 0 }, up, 3, near),
 	            .99999999999156228199, 1e-14);
 }
 
@@ -61,7 +61,7 @@ static void test_point_small_and_far(void **state)
 		const double v[] = { 0, 0, c, 0, 1, c, 1, 1, c, 1, 0, c };
 		double p = 1 / hypot(1, c), exact = p * atan(p) / pi;
 		/* The terms of far polygons cancel: absolute to rounding. */
-		assert_near(contour_point(x, up, 4, v), exact, 2e-16);
+		assert_near(geo_contour_point(x, up, 4, v), exact, 2e-16);
 	}
 }
 
@@ -100,7 +100,7 @@ static double perpendicular_contour(const double x[2], const double y[2], const 
 	const double b[] = { 0, eta[0], z[0], 0, eta[1], z[0], 0, eta[1], z[1], 0, eta[0], z[1] };
 	struct facet f = facet_of(4, a), g = facet_of(4, b);
 
-	return contour_exchange(&f, &g);
+	return geo_contour_exchange(&f, &g);
 }
 
 /* Edges in line: the same, partly overlapping, touching at a corner, apart; and thin. */
@@ -180,9 +180,9 @@ static void test_both_ways(void **state)
 		if (f.normal[2] < 0 || v3_dot(g.normal, f.v) - g.offset < 0 ||
 		    v3_dot(g.normal, &f.v[3]) - g.offset < 0 || v3_dot(g.normal, &f.v[6]) - g.offset < 0)
 			continue;
-		double one = contour_exchange(&f, &g);
-		assert_near(contour_exchange(&g, &f), one, 1e-14);
-		assert_near(contour_exchange(&f, &h), one, 1e-14);
+		double one = geo_contour_exchange(&f, &g);
+		assert_near(geo_contour_exchange(&g, &f), one, 1e-14);
+		assert_near(geo_contour_exchange(&f, &h), one, 1e-14);
 	}
 }
 
@@ -207,7 +207,7 @@ static int in_front(const struct facet *f, const struct facet *g)
 {
 	double low, high;
 
-	facet_heights(g, f->normal, f->offset, &low, &high);
+	geo_facet_heights(g, f->normal, f->offset, &low, &high);
 	return low > 0;
 }
 
@@ -217,7 +217,7 @@ static double spread_over(const struct facet *f, const struct cubature *c, const
 
 	for (int i = 0; i < c->n; i++) {
 		double x[3] = { c->x[i], c->y[i], c->z[i] };
-		sum += c->w[i] > 0 ? c->w[i] * contour_point(x, f->normal, g->n, g->v) : 0;
+		sum += c->w[i] > 0 ? c->w[i] * geo_contour_point(x, f->normal, g->n, g->v) : 0;
 	}
 	return sum;
 }
@@ -236,7 +236,7 @@ static void test_cubature_reach(void **state)
 			int l = pair % CUBATURE_LEVELS, quad = l == 0 || pair / 4 % 2;
 			struct cubature p = { 0, x[0][0], x[0][1], x[0][2], x[0][3] };
 			struct cubature q = { 0, x[1][0], x[1][1], x[1][2], x[1][3] };
-			cubature_reach(tolerance[t], reach);
+			geo_cubature_reach(tolerance[t], reach);
 			random_facet(&d, quad, 1, (double[]){ 0, 0, 0 }, v);
 			struct facet f = facet_of(quad ? 4 : 3, v);
 			roll_frame(&d, 0, frame);
@@ -245,11 +245,11 @@ static void test_cubature_reach(void **state)
 			struct facet g = facet_of(4, w);
 			if (!in_front(&f, &g) || !in_front(&g, &f))
 				continue;
-			cubature_fill(&f, l, &p);
-			cubature_fill(&g, 3, &q);
-			double exact = spread_over(&g, &q, &f), got = cubature_exchange(&f, &p, &g, &q);
+			geo_cubature_fill(&f, l, &p);
+			geo_cubature_fill(&g, 3, &q);
+			double exact = spread_over(&g, &q, &f), got = geo_cubature_exchange(&f, &p, &g, &q);
 			assert_near(got, exact, tolerance[t] * exact + 1e-15 * g.area);
-			assert_near(cubature_exchange(&g, &q, &f, &p), got, 1e-14 * got);
+			assert_near(geo_cubature_exchange(&g, &q, &f, &p), got, 1e-14 * got);
 		}
 }
 
@@ -270,8 +270,8 @@ static void test_cubature_weights(void **state)
 		for (int l = 0; l < CUBATURE_LEVELS; l++) {
 			struct cubature c = { 0, x[0], x[1], x[2], x[3] };
 			double sum = 0;
-			cubature_fill(&f, l, &c);
-			assert_int_equal(c.n, cubature_points(n, l));
+			geo_cubature_fill(&f, l, &c);
+			assert_int_equal(c.n, geo_cubature_points(n, l));
 			assert_int_equal(c.n % 4, 0);
 			for (int i = 0; i < c.n; i++) {
 				sum += c.w[i];
@@ -324,7 +324,7 @@ static void test_joint(void **state)
 	for (int t = 0; t < 60000; t++) {
 		double v[12], w[12], at[3], way[3][3], size = exp(roll(&d, -4, 0)), skew = t % 5 ? 0 : 1e-6;
 		double tol = tolerance[t % 3], far = (1 + size) * exp(roll(&d, 1.6, 3.8));
-		struct joint jf, jg;
+		struct cubature_pair jf, jg;
 		roll_frame(&d, 0, way);
 		for (int k = 0; k < 3; k++)
 			at[k] = far * way[0][k];
@@ -337,15 +337,15 @@ static void test_joint(void **state)
 		if (t % 4 == 1)
 			touch(&g, v);
 		f = facet_of(4, v);
-		joint_fill(&f, &jf);
-		joint_fill(&g, &jg);
-		if (!in_front(&f, &g) || !in_front(&g, &f) || !joint_reaches(&f, &jf, &g, &jg, tol))
+		geo_pair_fill(&f, &jf);
+		geo_pair_fill(&g, &jg);
+		if (!in_front(&f, &g) || !in_front(&g, &f) || !geo_pair_reaches(&f, &jf, &g, &jg, tol))
 			continue;
 		used++;
-		cubature_fill(&f, 3, &p);
-		cubature_fill(&g, 3, &q);
-		double exact = cubature_exchange(&f, &p, &g, &q);
-		assert_near(joint_exchange(&f, &jf, &g, &jg), exact, (tol + 1e-13) * exact);
+		geo_cubature_fill(&f, 3, &p);
+		geo_cubature_fill(&g, 3, &q);
+		double exact = geo_cubature_exchange(&f, &p, &g, &q);
+		assert_near(geo_pair_exchange(&f, &jf, &g, &jg), exact, (tol + 1e-13) * exact);
 	}
 	assert_true(used > 1000);
 }
@@ -356,10 +356,10 @@ static void test_joint_table(void **state)
 	enum { N = 40 };
 	const double tolerance = 8e-7, near = 1e-9;
 	struct dice d = { 19, 0 };
-	double v[N][12], one[JOINT_ONE], x[4], other[4], low, high;
+	double v[N][12], one[PAIR_ONE], x[4], other[4], low, high;
 	struct facet f[N];
-	struct joint joint[N];
-	struct joint_table t;
+	struct cubature_pair joint[N];
+	struct cubature_pair_table t;
 	struct err e = { 0 };
 	int reached = 0, behind = 0;
 
@@ -372,39 +372,39 @@ static void test_joint_table(void **state)
 		for (int k = 0; i % 4 == 1 && k < 4; k++)
 			v[i][3 * k + 2] = 0; /* many in one plane */
 		f[i] = facet_of(i % 7 ? 4 : 3, v[i]);
-		joint_fill(&f[i], &joint[i]);
+		geo_pair_fill(&f[i], &joint[i]);
 	}
-	assert_int_equal(joint_table_new(f, joint, N, tolerance, near, &t, &e), 0);
+	assert_int_equal(geo_pair_table_new(f, joint, N, tolerance, near, &t, &e), 0);
 	for (size_t i = 0; i < N; i++)
 		for (size_t j = 0; j < N; j++) {
-			joint_one(&t, i, one);
-			int known = joint_four(&t, one, j, 0, x) & 1;
-			joint_one(&t, j, one);
-			assert_int_equal(known, joint_four(&t, one, i, 1, other) & 1);
+			geo_pair_one(&t, i, one);
+			int known = geo_pair_four(&t, one, j, 0, x) & 1;
+			geo_pair_one(&t, j, one);
+			assert_int_equal(known, geo_pair_four(&t, one, i, 1, other) & 1);
 			int front = in_front(&f[i], &f[j]) && in_front(&f[j], &f[i]);
 			if (!known) {
-				assert_true(i == j || !front || !joint_reaches(&f[i], &joint[i], &f[j],
-				                                               &joint[j], .999 * tolerance) ||
+				assert_true(i == j || !front || !geo_pair_reaches(&f[i], &joint[i], &f[j],
+				                                                  &joint[j], .999 * tolerance) ||
 				            v3_dot(f[i].normal, f[j].centre) - f[i].offset < f[j].radius ||
 				            v3_dot(f[j].normal, f[i].centre) - f[j].offset < f[i].radius);
 				continue;
 			}
 			assert_true(x[0] == other[0]);
 			if (x[0] > 0) {
-				double exact = joint_exchange(&f[i], &joint[i], &f[j], &joint[j]);
+				double exact = geo_pair_exchange(&f[i], &joint[i], &f[j], &joint[j]);
 				assert_true(front);
 				assert_near(x[0], exact, 1e-13 * exact);
 				reached++;
 				continue;
 			}
-			facet_heights(&f[j], f[i].normal, f[i].offset, &low, &high);
+			geo_facet_heights(&f[j], f[i].normal, f[i].offset, &low, &high);
 			if (high > near)
-				facet_heights(&f[i], f[j].normal, f[j].offset, &low, &high);
+				geo_facet_heights(&f[i], f[j].normal, f[j].offset, &low, &high);
 			assert_true(high <= near);
 			behind++;
 		}
 	assert_true(reached > 100 && behind > 100);
-	joint_table_free(&t);
+	geo_pair_table_free(&t);
 }
 
 /* What is chosen for a pair, far, near, unequal or touching: within what was asked for. */
@@ -412,11 +412,11 @@ static void test_clear(void **state)
 {
 	static const double relative[] = { 8e-7, 1e-9 };
 	struct dice d = { 11, 0 };
-	static struct clear c;
+	static struct unoccluded c;
 
 	(void)state;
 	for (int t = 0; t < 2; t++) {
-		clear_init(&c, relative[t]);
+		geo_unoccluded_init(&c, relative[t]);
 		for (int pair = 0; pair < 3000; pair++) {
 			double v[12], w[12], at[3], size = exp(roll(&d, -6, 0)), gap = exp(roll(&d, -4, 2));
 			for (int k = 0; k < 3; k++)
@@ -427,12 +427,12 @@ static void test_clear(void **state)
 			struct facet f = facet_of(3 + quad, v), g = facet_of(4, w);
 			if (!in_front(&f, &g) || !in_front(&g, &f))
 				continue;
-			struct joint jf, jg;
-			joint_fill(&f, &jf);
-			joint_fill(&g, &jg);
-			double got = clear_exchange(&c, &f, (struct clear_points){ NULL, &jf },
-			                            &g, (struct clear_points){ NULL, &jg });
-			double exact = contour_exchange(&f, &g);
+			struct cubature_pair jf, jg;
+			geo_pair_fill(&f, &jf);
+			geo_pair_fill(&g, &jg);
+			double got = geo_unoccluded_exchange(&c, &f, (struct unoccluded_points){ NULL, &jf },
+			                                     &g, (struct unoccluded_points){ NULL, &jg });
+			double exact = geo_contour_exchange(&f, &g);
 			assert_near(got, exact, relative[t] * exact +
 			            2e-14 * (f.radius + g.radius) * (f.radius + g.radius));
 		}
@@ -466,14 +466,14 @@ static void test_facet_parts(void **state)
 		struct facet_room part[4];
 		roll_frame(&d, 0, plane);
 		double offset = v3_dot(plane[2], f.centre) + roll(&d, -.1, .1) * a;
-		if (facet_split(&f, plane[2], offset, part)) {
+		if (geo_facet_split(&f, plane[2], offset, part)) {
 			assert_near(part[0].f.area + part[1].f.area, f.area, 1e-14);
 			assert_plane(&part[0].f, &f);
 			assert_plane(&part[1].f, &f);
 		}
-		assert_true(facet_halve(&f, part));
+		assert_true(geo_facet_halve(&f, part));
 		assert_near(part[0].f.area + part[1].f.area, f.area, 1e-14);
-		if (!facet_quarter(&f, part))
+		if (!geo_facet_quarter(&f, part))
 			continue;
 		double sum = 0;
 		for (int i = 0; i < 4; i++) {
@@ -491,15 +491,15 @@ static void test_facet_clip(void **state)
 	struct facet_room out;
 
 	(void)state;
-	assert_true(facet_clip(&f, x, .25, &out));
+	assert_true(geo_facet_clip(&f, x, .25, &out));
 	assert_near(out.f.area, .75, 1e-16);
 	assert_int_equal(out.f.n, 4);
-	assert_true(facet_clip(&f, x, 0, &out));
+	assert_true(geo_facet_clip(&f, x, 0, &out));
 	assert_true(out.f.area == 1);
-	assert_false(facet_clip(&f, x, 1, &out));
-	assert_false(facet_clip(&f, x, 2, &out));
-	assert_true(facet_clip(&f, x, .5, &out));
-	assert_true(facet_clip(&out.f, (double[]){ 0, 1, 0 }, .5, &out));
+	assert_false(geo_facet_clip(&f, x, 1, &out));
+	assert_false(geo_facet_clip(&f, x, 2, &out));
+	assert_true(geo_facet_clip(&f, x, .5, &out));
+	assert_true(geo_facet_clip(&out.f, (double[]){ 0, 1, 0 }, .5, &out));
 	assert_near(out.f.area, .25, 1e-16);
 }
 
@@ -514,8 +514,8 @@ static void test_edge_divide(void **state)
 			a[k] = roll(&d, -1, 1);
 			b[k] = roll(&d, -1, 1);
 		}
-		edge_divide(a, ha, b, hb, p);
-		edge_divide(b, hb, a, ha, q);
+		geo_edge_divide(a, ha, b, hb, p);
+		geo_edge_divide(b, hb, a, ha, q);
 		assert_memory_equal(p, q, sizeof p);
 	}
 }

@@ -18,10 +18,10 @@
 static const double zero[3] = { 0, 0, 0 }, one[3] = { 1, 1, 1 };
 
 static const struct ff_options rays = { .method = FF_RAYS, .rays = 4096, .points = 1,
-	.emitter_gain = 1, .lobe_rays = 4096, .depth = 256, .seed = 1, .part = 1, .parts = 1,
+	.emitter_gain = 1, .lobe_rays = 4096, .depth = 256, .seed = 1, .shard = 1, .shards = 1,
 	.threads = 2 };
 static const struct ff_options cubes = { .method = FF_HEMICUBE, .rays = 64, .points = 16,
-	.emitter_gain = 1, .lobe_rays = 4096, .depth = 256, .seed = 1, .part = 1, .parts = 1,
+	.emitter_gain = 1, .lobe_rays = 4096, .depth = 256, .seed = 1, .shard = 1, .shards = 1,
 	.threads = 2 };
 
 static void set_diffuse(struct model *m, size_t material, double rho, double exitance)
@@ -29,8 +29,8 @@ static void set_diffuse(struct model *m, size_t material, double rho, double exi
 	struct materials *mt = &m->material;
 
 	mt->one_sided[material] = 1;
-	mt->rho_d[material_at(mt, material, FRONT)] = rho;
-	mt->emission[material_at(mt, material, FRONT)] = exitance / 3.14159265358979323846;
+	mt->rho_d[model_material_at(mt, material, FRONT)] = rho;
+	mt->emission[model_material_at(mt, material, FRONT)] = exitance / 3.14159265358979323846;
 }
 
 /* Solves; h[i] is the area mean of the irradiance of patch-side side[i]. */
@@ -101,12 +101,12 @@ static void plates_model(struct model *m, double lobe_exponent, int bands)
 	grid_quad(m, 2, 3, at, x, y);
 	for (size_t k = 0; k < 3; k++)
 		set_diffuse(m, k, k == 0 ? 0 : k == 1 ? .5 : .4, k == 1);
-	mt->rho_s[material_at(mt, 0, FRONT)] = 1;
+	mt->rho_s[model_material_at(mt, 0, FRONT)] = 1;
 	const double front[4] = { .1, .15, .25, .4 }, back[4] = { .2, .1, .25, .4 };
 	double *coefficient[4] = { mt->rho_d, mt->tau_d, mt->rho_s, mt->tau_s };
 	for (int k = 0; k < 4; k++) {
-		coefficient[k][material_at(mt, 3, FRONT)] = front[k];
-		coefficient[k][material_at(mt, 3, BACK)] = back[k];
+		coefficient[k][model_material_at(mt, 3, FRONT)] = front[k];
+		coefficient[k][model_material_at(mt, 3, BACK)] = back[k];
 	}
 	for (int s = 0; s < 2; s++)
 		mt->alpha[6 + s] = mt->beta[6 + s] = lobe_exponent;
@@ -159,12 +159,12 @@ static void six_bands(void **state)
 	plates_model(&m, 10, 6);
 	solved_begin(&x, &m, &rays, 0);
 	solved_finish(&x, 1e-9);
-	for (size_t i = 0; i < 2 * m.elements; i++)
+	for (size_t i = 0; i < 2 * m.element.n; i++)
 		for (int k = 1; k < 6; k++) {
 			double h = (k + 1) * solution_irradiance(&x.s, i, 0);
-			double e = (k + 1) * x.s.error[6 * i];
+			double e = (k + 1) * x.s.error.sampling[6 * i];
 			assert_true(fabs(solution_irradiance(&x.s, i, k) - h) <= 1e-12 * h);
-			assert_true(fabs(x.s.error[6 * i + (size_t)k] - e) <= 1e-5 * e);
+			assert_true(fabs(x.s.error.sampling[6 * i + (size_t)k] - e) <= 1e-5 * e);
 		}
 	solved_free(&x);
 	model_free(&m);
@@ -176,10 +176,10 @@ static void solution_of(const struct model *m, const struct ff *f, struct soluti
 	struct solved x;
 
 	solved_join(&x, m, NULL, f);
-	assert_int_equal(solution_begin(&x.s, m, &x.t, 0, &x.e), 0);
+	assert_int_equal(radiosity_begin(&x.s, m, &x.t, 0, &x.e), 0);
 	solved_finish(&x, 1e-9);
 	*s = x.s;
-	transport_free(&x.t);
+	radiosity_transport_free(&x.t);
 }
 
 /* Through a file whose receivers are patches or elements. */
@@ -194,12 +194,12 @@ static void solve_file(const struct model *m, const struct ff *f, int to_patches
 
 	assert_true(fd >= 0);
 	close(fd);
-	struct ff_writer *w = ff_file_create(path, m, f->value64 != NULL, to_patches, &e);
-	if (!w || ff_file_append(w, f, &e) || ff_file_finish(w, f, &info, &e) ||
-	    ff_file_open(path, m, NULL, &file, &e))
+	struct ff_writer *w = file_ff_create(path, m, f->value64 != NULL, to_patches, &e);
+	if (!w || file_ff_append(w, f, &e) || file_ff_finish(w, f, &info, &e) ||
+	    file_ff_open(path, m, NULL, &file, &e))
 		fail_msg("%s", e.text);
 	solution_of(m, &file.f, s);
-	ff_file_close(&file);
+	file_ff_close(&file);
 	unlink(path);
 }
 
@@ -221,13 +221,13 @@ static void patches_as_receivers(const struct ff_options *o, double exponent, do
 	solution_of(&m, &f, &memory);
 	solve_file(&m, &f, 0, &elements);
 	solve_file(&m, &f, 1, &patches);
-	for (size_t i = 0; i < 2 * m.elements; i++) {
-		uint32_t ps = 2 * m.element_patch[i >> 1] + (uint32_t)(i & 1);
+	for (size_t i = 0; i < 2 * m.element.n; i++) {
+		uint32_t ps = 2 * m.element.patch[i >> 1] + (uint32_t)(i & 1);
 		double h = solution_irradiance(&patches, i, 0);
 		assert_true(solution_irradiance(&memory, i, 0) == solution_irradiance(&elements, i, 0));
-		assert_true(memory.error[i] == elements.error[i]);
+		assert_true(memory.error.sampling[i] == elements.error.sampling[i]);
 		assert_true(fabs(h - patch_mean(&m, &elements, ps, 0)) <= tolerance * h);
-		assert_true(h == solution_irradiance(&patches, 2 * m.patch_start[ps >> 1] + (i & 1), 0));
+		assert_true(h == solution_irradiance(&patches, 2 * m.patch.start[ps >> 1] + (i & 1), 0));
 	}
 	solution_free(&memory);
 	solution_free(&elements);
@@ -254,7 +254,7 @@ static void patches_as_receivers_f64(void **state)
 
 static void shards_of_two_kinds(void **state)
 {
-	struct ff a = { .part = 1, .parts = 2 }, b = { .part = 2, .parts = 2, .to_patches = 1 };
+	struct ff a = { .shard = 1, .shards = 2 }, b = { .shard = 2, .shards = 2, .to_patches = 1 };
 	const struct ff *shard[] = { &a, &b };
 	const char *name[] = { "a.ff", "b.ff" };
 	const struct model m = { 0 };
@@ -262,9 +262,9 @@ static void shards_of_two_kinds(void **state)
 	struct err e = { 0 };
 
 	(void)state;
-	assert_int_equal(transport_init(&t, &m, shard, name, 2, 1, &e), -1);
+	assert_int_equal(radiosity_transport_init(&t, &m, shard, name, 2, 1, &e), -1);
 	assert_non_null(strstr(e.text, "b.ff: receivers are patches, but elements of a.ff"));
-	transport_free(&t);
+	radiosity_transport_free(&t);
 }
 
 /* A box whose first three walls have one albedo and emission, the others another. */
@@ -308,7 +308,7 @@ static void white_furnace(double rho, double passes)
 	assert_true(x.r.bound < 1e-7 * exact);
 	assert_true(x.r.passes <= passes);
 	assert_true(x.r.residual <= 1e-13);
-	for (uint32_t p = 0; p < m.patches; p++)
+	for (uint32_t p = 0; p < m.patch.n; p++)
 		assert_true(fabs(patch_mean(&m, &x.s, 2 * p, 0) / exact - 1) < .05);
 	solved_free(&x);
 	model_free(&m);
@@ -338,8 +338,8 @@ static void bound_is_sharp(void **state)
 		solved_finish(&x, k ? 1e-12 : .1);
 		bound = k ? bound : x.r.bound;
 		arrived[k] = 0;
-		for (size_t i = 0; i < m.elements; i++)
-			arrived[k] += m.element_area[i] * solution_irradiance(&x.s, 2 * i, 0);
+		for (size_t i = 0; i < m.element.n; i++)
+			arrived[k] += m.element.area[i] * solution_irradiance(&x.s, 2 * i, 0);
 	}
 	double missing = (arrived[1] - arrived[0]) / x.s.ledger[LEDGER_EMITTED];
 	assert_true(missing > .1);
@@ -350,14 +350,14 @@ static void bound_is_sharp(void **state)
 }
 
 /* Shooting every side by turns until nothing is left, with plain shots alone. */
-static void shoot_all(struct solver *v)
+static void shoot_all(struct shooter *v)
 {
 	double worst = 1;
 
 	for (int i = 0; i < 100000 && worst > 1e-13; i++) {
 		for (uint32_t ps = 0; ps < v->s->patch_sides; ps++)
-			solver_shoot(v, ps, 0);
-		solver_survey(v, &worst);
+			radiosity_shoot_side(v, ps, 0);
+		radiosity_survey(v, &worst);
 	}
 	assert_true(worst <= 1e-13);
 }
@@ -386,27 +386,27 @@ static void overshooting(double exponent, int bands)
 	plates_model(&m, exponent, bands);
 	solved_join(&x, &m, &o, NULL);
 	for (int k = 0; k < 2; k++) {
-		struct solver v;
+		struct shooter v;
 		double worst;
-		assert_int_equal(solution_begin(&x.s, &m, &x.t, 0, &x.e), 0);
-		assert_int_equal(solver_init(&v, &x.s, &x.t, &x.e), 0);
-		solver_survey(&v, &worst);
+		assert_int_equal(radiosity_begin(&x.s, &m, &x.t, 0, &x.e), 0);
+		assert_int_equal(radiosity_shooter_init(&v, &x.s, &x.t, &x.e), 0);
+		radiosity_survey(&v, &worst);
 		if (k == 0)
 			shoot_all(&v);
 		for (int i = 0; k == 1 && i < 3; i++)
-			assert_true(solver_overshoot(&v, 1, 1e-13, &x.e) >= 0);
-		solver_survey(&v, &worst);
+			assert_true(radiosity_gmres_finish(&v, 1, 1e-13, &x.e) >= 0);
+		radiosity_survey(&v, &worst);
 		assert_true(worst <= 1e-12);
 		assert_true(v.residual <= 1e-13);
-		sender_store(&v.sender, &x.s);
-		solver_free(&v);
+		radiosity_propagator_store(&v.sender, &x.s);
+		radiosity_shooter_free(&v);
 		solved_gather(&x);
 		s[k] = x.s;
 	}
 	size_t n = s[0].element_sides * (size_t)bands;
-	assert_near(s[0].direct, s[1].direct, n);
-	assert_near(s[0].caustic, s[1].caustic, n);
-	assert_near(s[0].indirect, s[1].indirect, n);
+	assert_near(s[0].irradiance.direct, s[1].irradiance.direct, n);
+	assert_near(s[0].irradiance.caustic, s[1].irradiance.caustic, n);
+	assert_near(s[0].irradiance.indirect, s[1].irradiance.indirect, n);
 	solution_free(&s[0]);
 	solved_free(&x);
 	model_free(&m);

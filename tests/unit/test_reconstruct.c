@@ -22,12 +22,12 @@ static double linear(const double p[3])
 /* Fills H with the element means of a field that is linear (centroid values). */
 static void fill(const struct model *m, struct solution *s, double (*field)(const double *))
 {
-	for (size_t e = 0; e < m->elements; e++) {
+	for (size_t e = 0; e < m->element.n; e++) {
 		double c[3] = { 0, 0, 0 };
 		for (size_t k = 0; k < 3; k++)
-			v3_mad(c, 1. / 3, &m->vertex[3 * (size_t)m->element[3 * e + k]], c);
+			v3_mad(c, 1. / 3, &m->vertex[3 * (size_t)m->element.corner[3 * e + k]], c);
 		for (size_t i = 0; i < 2 * (size_t)m->bands; i++)
-			s->indirect[2 * e * (size_t)m->bands + i] = field(c);
+			s->irradiance.indirect[2 * e * (size_t)m->bands + i] = field(c);
 	}
 }
 
@@ -40,16 +40,16 @@ static void run(const struct model *m, const struct solution *s, int threads,
                 struct reconstruction *r)
 {
 	struct err e = { 0 };
-	assert_int_equal(reconstruct(m, s, PART_ALL, threads, r, &e), 0);
+	assert_int_equal(interp_reconstruct(m, s, PART_ALL, threads, r, &e), 0);
 }
 
 static double worst(const struct model *m, const struct reconstruction *r,
                     double (*field)(const double *))
 {
 	double most = 0;
-	for (size_t c = 0; c < 3 * m->elements; c++)
+	for (size_t c = 0; c < 3 * m->element.n; c++)
 		most = fmax(most, fabs(corner(r, c / 3, c % 3) -
-		                       field(&m->vertex[3 * (size_t)m->element[c]])));
+		                       field(&m->vertex[3 * (size_t)m->element.corner[c]])));
 	return most;
 }
 
@@ -66,9 +66,9 @@ static void test_constant(void **state)
 		grid_end(&m);
 		grid_solution(&m, .1, &s);
 		run(&m, &s, 1, &r);
-		for (size_t i = 0; i < 18 * m.elements; i++)
+		for (size_t i = 0; i < 18 * m.element.n; i++)
 			assert_true(r.corner[i] == (float).1);
-		reconstruction_free(&r);
+		interp_reconstruction_free(&r);
 		grid_solution_free(&s);
 		model_free(&m);
 	}
@@ -89,7 +89,7 @@ static void test_linear(void **state)
 		fill(&m, &s, linear);
 		run(&m, &s, 1, &r); /* borders and corners included */
 		assert_true(worst(&m, &r, linear) < 1e-6);
-		reconstruction_free(&r);
+		interp_reconstruction_free(&r);
 		grid_solution_free(&s);
 		model_free(&m);
 	}
@@ -116,7 +116,7 @@ static void test_linear_irregular(void **state)
 	fill(&m, &s, linear);
 	run(&m, &s, 1, &r);
 	assert_true(worst(&m, &r, linear) < 1e-6);
-	reconstruction_free(&r);
+	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);
 }
@@ -140,21 +140,21 @@ static void test_never_negative(void **state)
 	fill(&m, &s, ramp_from_zero);
 	run(&m, &s, 1, &r);
 	assert_true(worst(&m, &r, ramp_from_zero) < 1e-6);
-	reconstruction_free(&r);
+	interp_reconstruction_free(&r);
 	/* A lit strip beside darkness: no undershoot, no overshoot, no NaN. */
-	for (size_t e = 0; e < m.elements; e++)
-		s.indirect[2 * e] = m.vertex[3 * (size_t)m.element[3 * e]] < .5 ? 0 : 1;
+	for (size_t e = 0; e < m.element.n; e++)
+		s.irradiance.indirect[2 * e] = m.vertex[3 * (size_t)m.element.corner[3 * e]] < .5 ? 0 : 1;
 	run(&m, &s, 1, &r);
-	for (size_t c = 0; c < 3 * m.elements; c++) {
+	for (size_t c = 0; c < 3 * m.element.n; c++) {
 		double v = corner(&r, c / 3, c % 3);
-		double x = m.vertex[3 * (size_t)m.element[c]];
+		double x = m.vertex[3 * (size_t)m.element.corner[c]];
 		assert_true(v >= 0 && v <= 1);
 		if (x < .49)
 			assert_true(v == 0);
 		if (x > .51)
 			assert_true(v > .999999);
 	}
-	reconstruction_free(&r);
+	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);
 }
@@ -177,12 +177,12 @@ static double fold_jump(double degrees)
 	}
 	grid_end(&m);
 	grid_solution(&m, 0, &s);
-	for (size_t e = 0; e < m.elements; e++)
-		s.indirect[2 * e] = s.indirect[2 * e + 1] = e % (2 * N) < N ? 1 : 2;
+	for (size_t e = 0; e < m.element.n; e++)
+		s.irradiance.indirect[2 * e] = s.irradiance.indirect[2 * e + 1] = e % (2 * N) < N ? 1 : 2;
 	run(&m, &s, 1, &r);
-	for (size_t c = 0; c < 3 * m.elements; c++)
-		jump = fmax(jump, fabs(corner(&r, c / 3, c % 3) - s.indirect[2 * (c / 3)]));
-	reconstruction_free(&r);
+	for (size_t c = 0; c < 3 * m.element.n; c++)
+		jump = fmax(jump, fabs(corner(&r, c / 3, c % 3) - s.irradiance.indirect[2 * (c / 3)]));
+	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);
 	return jump;
@@ -209,16 +209,16 @@ static void test_surfaces_and_rooms(void **state)
 	grid_quad(&m, 4, 0, right, x1, y1);
 	grid_end(&m);
 	/* Weld: the second surface's left column is the first one's right column. */
-	for (size_t i = 0; i < 3 * m.elements; i++)
-		if (m.element[i] >= 25 && (m.element[i] - 25) % 5 == 0)
-			m.element[i] = m.element[i] - 25 + 4;
+	for (size_t i = 0; i < 3 * m.element.n; i++)
+		if (m.element.corner[i] >= 25 && (m.element.corner[i] - 25) % 5 == 0)
+			m.element.corner[i] = m.element.corner[i] - 25 + 4;
 	grid_solution(&m, 0, &s);
-	for (size_t e = 0; e < m.elements / 2; e++)
-		s.indirect[2 * e] = 5;
+	for (size_t e = 0; e < m.element.n / 2; e++)
+		s.irradiance.indirect[2 * e] = 5;
 	run(&m, &s, 1, &r);
-	for (size_t c = 0; c < 3 * m.elements; c++) /* the dark room stays dark */
-		assert_true(corner(&r, c / 3, c % 3) == (c / 3 < m.elements / 2 ? 5 : 0));
-	reconstruction_free(&r);
+	for (size_t c = 0; c < 3 * m.element.n; c++) /* the dark room stays dark */
+		assert_true(corner(&r, c / 3, c % 3) == (c / 3 < m.element.n / 2 ? 5 : 0));
+	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);
 }
@@ -239,21 +239,21 @@ static void test_noise(void **state)
 	grid_end(&m);
 	grid_solution(&m, 0, &s);
 	fill(&m, &s, linear);
-	for (size_t i = 0; i < 2 * m.elements; i++) {
+	for (size_t i = 0; i < 2 * m.element.n; i++) {
 		double noise = .5 * (rng_uniform(&g) - .5);
-		s.indirect[i] += noise;
-		before += noise * noise / (double)(2 * m.elements);
+		s.irradiance.indirect[i] += noise;
+		before += noise * noise / (double)(2 * m.element.n);
 	}
 	for (int known = 0; known < 2; known++) {
-		for (size_t i = 0; i < 2 * m.elements; i++)
-			s.error[i] = known ? sqrt(before) : 0;
+		for (size_t i = 0; i < 2 * m.element.n; i++)
+			s.error.sampling[i] = known ? sqrt(before) : 0;
 		run(&m, &s, 2, &r);
-		for (size_t c = 0; c < 3 * m.elements; c++) {
+		for (size_t c = 0; c < 3 * m.element.n; c++) {
 			double d = corner(&r, c / 3, c % 3) -
-			           linear(&m.vertex[3 * (size_t)m.element[c]]);
-			after[known] += d * d / (double)(3 * m.elements);
+			           linear(&m.vertex[3 * (size_t)m.element.corner[c]]);
+			after[known] += d * d / (double)(3 * m.element.n);
 		}
-		reconstruction_free(&r);
+		interp_reconstruction_free(&r);
 	}
 	assert_true(after[0] < .25 * before);
 	assert_true(after[1] < .5 * after[0]);
@@ -282,17 +282,17 @@ static void test_mean(void **state)
 	grid_end(&m);
 	grid_solution(&m, 0, &s);
 	fill(&m, &s, hill);
-	for (size_t i = 0; i < 2 * m.elements; i++) {
-		s.indirect[i] += .3 * (rng_uniform(&g) - .5);
-		s.error[i] = .3 / sqrt(12);
+	for (size_t i = 0; i < 2 * m.element.n; i++) {
+		s.irradiance.indirect[i] += .3 * (rng_uniform(&g) - .5);
+		s.error.sampling[i] = .3 / sqrt(12);
 	}
 	run(&m, &s, 1, &r);
-	for (size_t e = 0; e < m.elements; e++) {
-		before += s.indirect[2 * e];
+	for (size_t e = 0; e < m.element.n; e++) {
+		before += s.irradiance.indirect[2 * e];
 		after += (corner(&r, e, 0) + corner(&r, e, 1) + corner(&r, e, 2)) / 3;
 	}
 	assert_true(fabs(after / before - 1) < 5e-4);
-	reconstruction_free(&r);
+	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);
 }
@@ -309,13 +309,13 @@ static void test_threads(void **state)
 	grid_quad(&m, N, 0, origin, x1, y1);
 	grid_end(&m);
 	grid_solution(&m, 0, &s);
-	for (size_t i = 0; i < 6 * m.elements; i++)
-		s.indirect[i] = (double)(rng_mix(i) % 1000);
+	for (size_t i = 0; i < 6 * m.element.n; i++)
+		s.irradiance.indirect[i] = (double)(rng_mix(i) % 1000);
 	run(&m, &s, 1, &a);
 	run(&m, &s, 3, &b);
-	assert_memory_equal(a.corner, b.corner, 18 * m.elements * sizeof *a.corner);
-	reconstruction_free(&a);
-	reconstruction_free(&b);
+	assert_memory_equal(a.corner, b.corner, 18 * m.element.n * sizeof *a.corner);
+	interp_reconstruction_free(&a);
+	interp_reconstruction_free(&b);
 	grid_solution_free(&s);
 	model_free(&m);
 }
@@ -340,14 +340,14 @@ static void test_fan(void **state)
 		grid_triangle(&m, 0, i, i % SPOKES + 1);
 	}
 	grid_triangle(&m, 1, 1, 2);
-	m.surface.n = m.patches = 1;
-	m.patch_start[1] = (uint32_t)m.elements;
+	m.surface.n = m.patch.n = 1;
+	m.patch.start[1] = (uint32_t)m.element.n;
 	grid_end(&m);
 	grid_solution(&m, 3, &s);
 	run(&m, &s, 1, &r);
-	for (size_t i = 0; i < 6 * m.elements; i++)
+	for (size_t i = 0; i < 6 * m.element.n; i++)
 		assert_true(fabs((double)r.corner[i] - 3) < 1e-6);
-	reconstruction_free(&r);
+	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);
 }

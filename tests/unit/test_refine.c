@@ -8,24 +8,24 @@
 #include "tests/unit/fixtures/grid.h"
 #include "tests/unit/fixtures/shapes.h"
 
-static const struct mesher_refinement how = { .01, { .02, 0 }, 100000 };
+static const struct mesh_refinement how = { .01, { .02, 0 }, 100000 };
 
 static void centroid(const struct model *m, size_t e, double c[3])
 {
 	c[0] = c[1] = c[2] = 0;
 	for (size_t k = 0; k < 3; k++)
-		v3_mad(c, 1. / 3, &m->vertex[3 * (size_t)m->element[3 * e + k]], c);
+		v3_mad(c, 1. / 3, &m->vertex[3 * (size_t)m->element.corner[3 * e + k]], c);
 }
 
 /* Errors near a point of the front. */
 static void doubt(const struct model *m, struct solution *s, const double at[3], double reach)
 {
-	for (size_t e = 0; e < m->elements; e++) {
+	for (size_t e = 0; e < m->element.n; e++) {
 		double c[3];
 		centroid(m, e, c);
 		v3_sub(c, at, c);
 		if (v3_length(c) < reach)
-			s->discretisation[2 * e] = s->discretisation_direct[2 * e] = .5;
+			s->error.discretisation[2 * e] = s->error.discretisation_direct[2 * e] = .5;
 	}
 }
 
@@ -34,8 +34,8 @@ static double longest(const struct model *m, size_t e)
 	double most = 0, d[3];
 
 	for (size_t k = 0; k < 3; k++) {
-		v3_sub(&m->vertex[3 * (size_t)m->element[3 * e + k]],
-		       &m->vertex[3 * (size_t)m->element[3 * e + (k + 1) % 3]], d);
+		v3_sub(&m->vertex[3 * (size_t)m->element.corner[3 * e + k]],
+		       &m->vertex[3 * (size_t)m->element.corner[3 * e + (k + 1) % 3]], d);
 		most = fmax(most, v3_length(d));
 	}
 	return most;
@@ -44,19 +44,19 @@ static double longest(const struct model *m, size_t e)
 struct refined {
 	struct model base, old, m; /* base is used up by refining, old is the same again */
 	struct solution s;         /* of these: light 1 everywhere, without errors at first */
-	struct mesher_report r;
+	struct mesh_report r;
 	uint32_t *origin;
 	struct err e;
 };
 
-static void mesh(struct model *m, void (*make)(struct model *), struct mesher_options o)
+static void mesh(struct model *m, void (*make)(struct model *), struct mesh_options o)
 {
 	make(m);
-	struct mesher_report r = run(m, o);
-	mesher_report_free(&r);
+	struct mesh_report r = run(m, o);
+	mesh_report_free(&r);
 }
 
-static void prepare(struct refined *f, void (*make)(struct model *), struct mesher_options o)
+static void prepare(struct refined *f, void (*make)(struct model *), struct mesh_options o)
 {
 	*f = (struct refined){ 0 };
 	mesh(&f->base, make, o);
@@ -64,31 +64,31 @@ static void prepare(struct refined *f, void (*make)(struct model *), struct mesh
 	make(&f->m);
 	grid_solution(&f->old, 0, &f->s);
 	for (size_t i = 0; i < f->s.element_sides; i++)
-		f->s.direct[i] = 1;
+		f->s.irradiance.direct[i] = 1;
 }
 
 /* Light that differs along some of the axes. */
 static void make_uneven(struct refined *f, double by, int first_axis)
 {
-	for (size_t i = 0; i < f->old.elements; i++) {
+	for (size_t i = 0; i < f->old.element.n; i++) {
 		double c[3];
 		centroid(&f->old, i, c);
 		for (int k = first_axis; k < 3; k++)
-			f->s.direct[2 * i] += by * sin(8 * acos(-1) * c[k]);
+			f->s.irradiance.direct[2 * i] += by * sin(8 * acos(-1) * c[k]);
 	}
 }
 
-static int refine_once(struct refined *f, const struct mesher_options *o,
-                       const struct mesher_refinement *to)
+static int refine_once(struct refined *f, const struct mesh_options *o,
+                       const struct mesh_refinement *to)
 {
-	return mesher_refine(&f->m, o, &f->base, &f->s, to, &f->origin, &f->r, &f->e);
+	return mesh_refine(&f->m, o, &f->base, &f->s, to, &f->origin, &f->r, &f->e);
 }
 
 /* The mesh of a scene, refined near a point. */
 static void refine(struct refined *f, void (*make)(struct model *), double size,
                    const double at[3], double reach)
 {
-	struct mesher_options o = sizes(size, size / 2, 0);
+	struct mesh_options o = sizes(size, size / 2, 0);
 
 	prepare(f, make, o);
 	doubt(&f->old, &f->s, at, reach);
@@ -103,7 +103,7 @@ static void refine(struct refined *f, void (*make)(struct model *), double size,
 static void release(struct refined *f)
 {
 	grid_solution_free(&f->s);
-	mesher_report_free(&f->r);
+	mesh_report_free(&f->r);
 	model_free(&f->base);
 	model_free(&f->old);
 	model_free(&f->m);
@@ -112,16 +112,16 @@ static void release(struct refined *f)
 
 static void check_origins(const struct refined *f)
 {
-	double *area = calloc(f->old.elements, sizeof *area);
+	double *area = calloc(f->old.element.n, sizeof *area);
 
-	for (size_t i = 0; i < f->m.elements; i++) {
+	for (size_t i = 0; i < f->m.element.n; i++) {
 		uint32_t o = f->origin[i];
-		assert_true(o < f->old.elements);
-		assert_int_equal(f->m.element_triangle[i], f->old.element_triangle[o]);
-		area[o] += f->m.element_area[i];
+		assert_true(o < f->old.element.n);
+		assert_int_equal(f->m.element.triangle[i], f->old.element.triangle[o]);
+		area[o] += f->m.element.area[i];
 	}
-	for (size_t o = 0; o < f->old.elements; o++)
-		assert_true(fabs(area[o] - f->old.element_area[o]) < 1e-12);
+	for (size_t o = 0; o < f->old.element.n; o++)
+		assert_true(fabs(area[o] - f->old.element.area[o]) < 1e-12);
 	free(area);
 }
 
@@ -131,16 +131,16 @@ static void test_conforming(void **state)
 
 	(void)state;
 	refine(&f, make_cube, .25, (double[]){ .3, .4, 1 }, .1);
-	assert_true(f.r.marked > 0 && f.m.elements > f.old.elements);
+	assert_true(f.r.marked > 0 && f.m.element.n > f.old.element.n);
 	check_origins(&f);
-	for (size_t e = 0; e < f.m.elements; e++) {
+	for (size_t e = 0; e < f.m.element.n; e++) {
 		uint32_t o = f.origin[e];
 		double l = longest(&f.m, e);
 		assert_true(l <= longest(&f.old, o) && l > how.smallest.value * .999);
-		if (f.s.discretisation[2 * o] > 0) /* three times, which leaves .35 of the energy */
+		if (f.s.error.discretisation[2 * o] > 0) /* three times, which leaves .35 of the energy */
 			assert_true(l < .36 * longest(&f.old, o));
 		/* Bisected right triangles stay right and isosceles. */
-		assert_true(f.m.element_area[e] > .249 * l * l);
+		assert_true(f.m.element.area[e] > .249 * l * l);
 	}
 	release(&f);
 }
@@ -154,18 +154,18 @@ static void test_elsewhere(void **state)
 
 	(void)state;
 	refine(&f, make_cube, .25, at, .1);
-	for (size_t e = 0; e < f.m.elements; e++) {
+	for (size_t e = 0; e < f.m.element.n; e++) {
 		double c[3];
 		centroid(&f.m, e, c);
 		v3_sub(c, at, c);
 		if (v3_length(c) < .5)
 			continue;
-		assert_true(f.m.element_area[e] == f.old.element_area[f.origin[e]]);
-		assert_true(fabs(f.m.patch_area[f.m.element_patch[e]] -
-		                 f.old.patch_area[f.old.element_patch[f.origin[e]]]) < 1e-15);
+		assert_true(f.m.element.area[e] == f.old.element.area[f.origin[e]]);
+		assert_true(fabs(f.m.patch.area[f.m.element.patch[e]] -
+		                 f.old.patch.area[f.old.element.patch[f.origin[e]]]) < 1e-15);
 		same++;
 	}
-	assert_true(same > f.old.elements / 2);
+	assert_true(same > f.old.element.n / 2);
 	release(&f);
 }
 
@@ -176,9 +176,9 @@ static void test_nothing_to_do(void **state)
 	(void)state;
 	refine(&f, make_room, .3, (double[]){ 9, 9, 9 }, .1);
 	assert_int_equal(f.r.marked, 0);
-	assert_int_equal(f.m.elements, f.old.elements);
-	assert_int_equal(f.m.patches, f.old.patches);
-	for (size_t i = 0; i < f.m.elements; i++)
+	assert_int_equal(f.m.element.n, f.old.element.n);
+	assert_int_equal(f.m.patch.n, f.old.patch.n);
+	for (size_t i = 0; i < f.m.element.n; i++)
 		assert_int_equal(f.origin[i], i);
 	assert_memory_equal(f.m.vertex, f.old.vertex, 3 * f.m.vertices * sizeof(double));
 	release(&f);
@@ -189,18 +189,18 @@ static void test_nothing_to_do(void **state)
 static void test_out_of_reach(void **state)
 {
 	const double at[3] = { .3, .4, 1 };
-	const struct mesher_refinement one = { how.error, { .08, 0 }, how.elements };
-	const struct mesher_options o = sizes(.25, .125, 0);
+	const struct mesh_refinement one = { how.error, { .08, 0 }, how.elements };
+	const struct mesh_options o = sizes(.25, .125, 0);
 	struct refined f;
 	size_t near = 0;
 
 	(void)state;
 	prepare(&f, make_cube, o);
 	for (size_t i = 0; i < f.s.element_sides; i++)
-		f.s.discretisation[i] = f.s.discretisation_direct[i] = 1e-4;
+		f.s.error.discretisation[i] = f.s.error.discretisation_direct[i] = 1e-4;
 	doubt(&f.old, &f.s, at, .1);
 	for (size_t i = 0; i < f.s.element_sides; i++)
-		near += f.s.discretisation[i] > .1;
+		near += f.s.error.discretisation[i] > .1;
 	assert_int_equal(refine_once(&f, &o, &one), 0);
 	assert_int_equal(f.r.marked, near);
 	assert_true(f.r.error_expected > one.error);
@@ -211,24 +211,24 @@ static void test_out_of_reach(void **state)
  * elements are right; one in the middle of a wall is not. */
 static void test_patches(void **state)
 {
-	struct mesher_options o = sizes(.25, .1, 0);
+	struct mesh_options o = sizes(.25, .1, 0);
 	struct refined f;
 
 	(void)state;
 	prepare(&f, make_room, o);
 	make_uneven(&f, .4, 0);
 	assert_int_equal(refine_once(&f, &o, &how), 0);
-	assert_true(f.r.patches_marked > 0 && f.r.marked == 0 && f.m.patches > f.old.patches);
-	for (uint32_t p = 0; p < f.m.patches; p++) {
+	assert_true(f.r.patches_marked > 0 && f.r.marked == 0 && f.m.patch.n > f.old.patch.n);
+	for (uint32_t p = 0; p < f.m.patch.n; p++) {
 		int border = 0;
-		for (size_t i = 3 * (size_t)f.m.patch_start[p];
-		     i < 3 * (size_t)f.m.patch_start[p + 1]; i++)
+		for (size_t i = 3 * (size_t)f.m.patch.start[p];
+		     i < 3 * (size_t)f.m.patch.start[p + 1]; i++)
 			for (size_t k = 0; k < 3; k++) {
-				double x = f.m.vertex[3 * (size_t)f.m.element[i] + k];
-				const double *n = &f.m.element_normal[3 * (i / 3)];
+				double x = f.m.vertex[3 * (size_t)f.m.element.corner[i] + k];
+				const double *n = &f.m.element.normal[3 * (i / 3)];
 				border |= fabs(n[k]) < .5 && (x < .26 || x > .74);
 			}
-		assert_true(border || f.m.patch_area[p] > .9 / 16);
+		assert_true(border || f.m.patch.area[p] > .9 / 16);
 	}
 	release(&f);
 }
@@ -252,15 +252,15 @@ static size_t count(const struct model *m, uint32_t surface)
 {
 	size_t n = 0;
 
-	for (size_t p = 0; p < m->patches; p++)
-		n += m->patch_surface[p] == surface;
+	for (size_t p = 0; p < m->patch.n; p++)
+		n += m->patch.surface[p] == surface;
 	return n;
 }
 
 /* Patches of the wall that are halved for the plate, where its light is uneven by so much. */
 static size_t halved_for(double distance, double exponent, double uneven)
 {
-	struct mesher_options o = sizes(.25, .1, 0);
+	struct mesh_options o = sizes(.25, .1, 0);
 	struct refined f;
 
 	plate_distance = distance;
@@ -290,7 +290,7 @@ static void test_lobes(void **state)
 
 static void test_changed(void **state)
 {
-	struct mesher_options o = sizes(.25, .1, 0);
+	struct mesh_options o = sizes(.25, .1, 0);
 	struct refined f;
 
 	(void)state;

@@ -42,7 +42,7 @@ static void octant(void **state)
 {
 	const double v[] = { 3, 0, 0, 0, 1, 0, 0, 0, 2 }, x[3] = { 0 };
 	(void)state;
-	assert_true(fabs(triangle_angle(v, x) - pi / 2) < 1e-14);
+	assert_true(fabs(geo_solid_angle(v, x) - pi / 2) < 1e-14);
 }
 
 static void samples(void **state)
@@ -53,11 +53,11 @@ static void samples(void **state)
 	(void)state;
 	for (int t = 0; t < TRIANGLES; t++) {
 		const double (*v)[3] = triangle[t];
-		double angle = triangle_angle(v[0], x), sum[3] = { 0 }, want[3], normal[3];
+		double angle = geo_solid_angle(v[0], x), sum[3] = { 0 }, want[3], normal[3];
 		v3_area(v[0], v[1], v[2], normal);
 		for (uint32_t i = 0; i < N; i++) {
 			double u[2] = { rng_sobol(i, 0, 1), rng_sobol(i, 1, 1) }, dir[3];
-			triangle_direction(v[0], x, angle, u, dir);
+			geo_solid_angle_sample(v[0], x, angle, u, dir);
 			assert_true(fabs(v3_length(dir) - 1) < 1e-12);
 			/* It is within: on the same side of all planes through edges. */
 			for (int k = 0; k < 3; k++) {

@@ -22,7 +22,7 @@ static void grey_image(struct image *im, int width, int height, float value)
 {
 	struct err e = { 0 };
 
-	assert_int_equal(image_new(im, width, height, 3, names, &e), 0);
+	assert_int_equal(picture_image_new(im, width, height, 3, names, &e), 0);
 	for (int i = 0; i < 3 * width * height; i++)
 		im->pixel[i] = value;
 }
@@ -30,7 +30,7 @@ static void grey_image(struct image *im, int width, int height, float value)
 static void set_grey(struct image *im, int at, float value)
 {
 	for (int c = 0; c < 3; c++)
-		image_plane(im, c)[at] = value;
+		picture_image_plane(im, c)[at] = value;
 }
 
 static void near(double got, double expected, double tolerance)
@@ -49,24 +49,24 @@ static void test_black(void **state)
 
 	(void)state;
 	grey_image(&im, 8, 8, 0);
-	assert_true(tonemap_exposure(&im, rgb, &lit) == 0);
+	assert_true(picture_tonemap_exposure(&im, rgb, &lit) == 0);
 	assert_int_equal(lit, 0);
-	assert_int_equal(canvas_new(&c, 8, 8, &e), 0);
+	assert_int_equal(picture_canvas_new(&c, 8, 8, &e), 0);
 	for (curve.compress = 0; curve.compress < 2; curve.compress++) {
-		assert_int_equal(tonemap_curve(&im, rgb, &curve, &c), 0);
+		assert_int_equal(picture_tonemap_curve(&im, rgb, &curve, &c), 0);
 		for (int i = 0; i < 3 * 64; i++)
 			assert_true(c.rgb[i] == 0);
 	}
 	for (int logarithmic = 0; logarithmic < 2; logarithmic++) {
 		struct tone_scale s = { NAN, NAN, logarithmic };
 
-		assert_int_equal(tonemap_scale(&im, rgb, &s, &e), 0);
+		assert_int_equal(picture_tonemap_scale(&im, rgb, &s, &e), 0);
 		near(s.min, logarithmic ? .01 : 0, 1e-15);
 		near(s.max, 1, 0);
-		assert_int_equal(tonemap_false_colour(&im, rgb, &s, &c), 0);
+		assert_int_equal(picture_tonemap_false_colour(&im, rgb, &s, &c), 0);
 	}
-	canvas_free(&c);
-	image_free(&im);
+	picture_canvas_free(&c);
+	picture_image_free(&im);
 }
 
 static void test_exposure(void **state)
@@ -78,7 +78,7 @@ static void test_exposure(void **state)
 	(void)state;
 	for (size_t i = 0; i < sizeof levels / sizeof *levels; i++) {
 		grey_image(&im, 10, 10, levels[i]);
-		near(tonemap_exposure(&im, rgb, &lit), log2(.18 / levels[i]), .01);
+		near(picture_tonemap_exposure(&im, rgb, &lit), log2(.18 / levels[i]), .01);
 		/* Lamps, black and broken pixels do not matter. */
 		set_grey(&im, 0, 3e38f);
 		set_grey(&im, 1, 3e38f);
@@ -86,9 +86,9 @@ static void test_exposure(void **state)
 			set_grey(&im, k, 0);
 		set_grey(&im, 2, NAN);
 		set_grey(&im, 3, -1);
-		near(tonemap_exposure(&im, rgb, &lit), log2(.18 / levels[i]), .01);
+		near(picture_tonemap_exposure(&im, rgb, &lit), log2(.18 / levels[i]), .01);
 		assert_int_equal(lit, 58);
-		image_free(&im);
+		picture_image_free(&im);
 	}
 }
 
@@ -106,27 +106,27 @@ static void test_curve(void **state)
 	set_grey(&im, 1, .001f);
 	set_grey(&im, 2, 7);
 	set_grey(&im, 3, -7);
-	image_plane(&im, 1)[4] = INFINITY;
-	assert_int_equal(canvas_new(&c, 5, 1, &e), 0);
-	assert_int_equal(tonemap_curve(&im, rgb, &curve, &c), 1);
+	picture_image_plane(&im, 1)[4] = INFINITY;
+	assert_int_equal(picture_canvas_new(&c, 5, 1, &e), 0);
+	assert_int_equal(picture_tonemap_curve(&im, rgb, &curve, &c), 1);
 	near(c.rgb[0], 1.055 * pow(.5, 1 / 2.4) - .055, 1e-6);
 	near(c.rgb[3], .002 * 12.92, 1e-6);
-	canvas_quantise(&c, 8, bytes);
+	picture_canvas_quantise(&c, 8, bytes);
 	assert_int_equal(bytes[0], 188); /* the sRGB code of one half */
 	assert_int_equal(bytes[6], 255);
 	assert_int_equal(bytes[9], 0);
 	assert_true(bytes[12] == 255 && bytes[13] == 0 && bytes[14] == 255);
-	canvas_quantise(&c, 16, words);
+	picture_canvas_quantise(&c, 16, words);
 	assert_int_equal(words[6], 65535);
 
 	/* White stays white and .5 becomes .5 (1 + .5 / 16) / 1.5. */
 	curve = (struct tone_curve){ .exposure = 1, .white = 4, .compress = 1 };
 	set_grey(&im, 2, 2);
-	assert_int_equal(tonemap_curve(&im, rgb, &curve, &c), 1);
+	assert_int_equal(picture_tonemap_curve(&im, rgb, &curve, &c), 1);
 	near(c.rgb[0], 1.055 * pow(.34375, 1 / 2.4) - .055, 1e-6);
 	near(c.rgb[6], 1, 1e-6);
-	canvas_free(&c);
-	image_free(&im);
+	picture_canvas_free(&c);
+	picture_image_free(&im);
 }
 
 static void test_colours(void **state)
@@ -136,7 +136,7 @@ static void test_colours(void **state)
 
 	(void)state;
 	for (int i = 0; i <= 1000; i++) {
-		tonemap_colour(i / 1000., c);
+		picture_tonemap_colour(i / 1000., c);
 		double l = .299 * (double)c[0] + .587 * (double)c[1] + .114 * (double)c[2];
 		for (int k = 0; k < 3; k++)
 			assert_true(c[k] >= 0 && c[k] <= 1);
@@ -145,9 +145,9 @@ static void test_colours(void **state)
 		assert_true(fabsf(c[0] - 1) + c[1] + fabsf(c[2] - 1) > .5f);
 		before = l;
 	}
-	tonemap_colour(0, c);
+	picture_tonemap_colour(0, c);
 	near((double)(c[0] + c[1] + c[2]), 0, 1e-6);
-	tonemap_colour(1, c);
+	picture_tonemap_colour(1, c);
 	near((double)(c[0] + c[1] + c[2]), 3, 1e-6);
 }
 
@@ -160,13 +160,13 @@ static void check_scale(float low, float high, int logarithmic, double min, doub
 	grey_image(&im, 10, 10, high);
 	for (int i = 0; i < 50; i++)
 		set_grey(&im, i, low);
-	if (tonemap_scale(&im, rgb, &s, &e))
+	if (picture_tonemap_scale(&im, rgb, &s, &e))
 		fail_msg("%s", e.text);
 	near(s.min, min, 1e-9 * (fabs(min) + fabs(max)));
 	near(s.max, max, 1e-9 * (fabs(min) + fabs(max)));
-	assert_true(tonemap_position(&s, s.min) == 0);
-	assert_true(tonemap_position(&s, s.max) == 1);
-	image_free(&im);
+	assert_true(picture_tonemap_position(&s, s.min) == 0);
+	assert_true(picture_tonemap_position(&s, s.max) == 1);
+	picture_image_free(&im);
 }
 
 static void test_scale(void **state)
@@ -184,14 +184,14 @@ static void test_scale(void **state)
 	check_scale(-.3f, 15, 0, -.5, 20);
 	check_scale(-.3f, -.2f, 0, -.5, 0);
 	grey_image(&im, 4, 4, 100);
-	assert_int_equal(tonemap_scale(&im, rgb, &s, &e), 0);
+	assert_int_equal(picture_tonemap_scale(&im, rgb, &s, &e), 0);
 	near(s.min, .3, 1e-12);
-	near(tonemap_position(&s, .3 * sqrt(10)), .5, 1e-12);
+	near(picture_tonemap_position(&s, .3 * sqrt(10)), .5, 1e-12);
 	set_grey(&im, 0, 1);
-	image_free(&im);
+	picture_image_free(&im);
 	grey_image(&im, 4, 4, 1);
-	assert_int_equal(tonemap_scale(&im, rgb, &bad, &e), -1);
-	image_free(&im);
+	assert_int_equal(picture_tonemap_scale(&im, rgb, &bad, &e), -1);
+	picture_image_free(&im);
 }
 
 /* The legend's bar runs through all colours, and something white stands beside it. */
@@ -202,17 +202,17 @@ static void check_legend(const struct tone_scale *s, int width, int height)
 	int old_width = width, bar, white = 0;
 	float top[3], *p;
 
-	assert_int_equal(canvas_new(&c, width, height, &e), 0);
+	assert_int_equal(picture_canvas_new(&c, width, height, &e), 0);
 	for (int i = 0; i < 3 * width * height; i++)
 		c.rgb[i] = .25f;
-	assert_int_equal(legend_append(&c, s, &e), 0);
+	assert_int_equal(picture_legend_append(&c, s, &e), 0);
 	assert_true(c.width > old_width);
 	assert_int_equal(c.height, height < 40 ? 40 : height);
 	for (int x = 0; x < old_width; x++)
 		assert_true(c.rgb[3 * x] == .25f);
 	int dot = 1 + c.height / 500;
 	bar = old_width + 6 * dot + 6 * dot;
-	tonemap_colour(1, top);
+	picture_tonemap_colour(1, top);
 	p = c.rgb + 3 * (6 * dot * c.width + bar);
 	for (int k = 0; k < 3; k++)
 		near((double)p[k], (double)top[k], 1e-6);
@@ -223,7 +223,7 @@ static void check_legend(const struct tone_scale *s, int width, int height)
 	/* The numbers end before the edge. */
 	for (int y = 0; y < c.height; y++)
 		assert_true(c.rgb[3 * (y * c.width + c.width - 1)] == 0);
-	canvas_free(&c);
+	picture_canvas_free(&c);
 }
 
 static void test_legend(void **state)
@@ -254,7 +254,7 @@ static void test_png(void **state)
 	(void)state;
 	assert_true(fd >= 0);
 	close(fd);
-	assert_int_equal(png_file_write(path, 2, 2, 16, out, "caf\xc3\xa9", &e), 0);
+	assert_int_equal(file_png_write(path, 2, 2, 16, out, "caf\xc3\xa9", &e), 0);
 	assert_true(png_image_begin_read_from_file(&png, path));
 	assert_int_equal(png.width, 2);
 	assert_int_equal(png.height, 2);
@@ -274,7 +274,7 @@ static void test_png(void **state)
 	fclose(file);
 	unlink(path);
 
-	assert_int_equal(png_file_write("/dev/full", 2, 2, 8, out, NULL, &f), -1);
+	assert_int_equal(file_png_write("/dev/full", 2, 2, 8, out, NULL, &f), -1);
 	assert_string_equal(f.text, "/dev/full: cannot write: No space left on device");
 }
 

@@ -16,9 +16,9 @@ static const uint8_t sides[] = { 3, 1 };
 
 static struct ff_scene scene_of(const struct model *m)
 {
-	return (struct ff_scene){ .patches = m->patches, .elements = m->elements,
-		.materials = m->material.n, .patch_start = m->patch_start,
-		.patch_area = m->patch_area, .patch_sides = sides };
+	return (struct ff_scene){ .patches = m->patch.n, .elements = m->element.n,
+		.materials = m->material.n, .patch_start = m->patch.start,
+		.patch_area = m->patch.area, .patch_sides = sides };
 }
 
 static void near(double got, double want)
@@ -40,20 +40,20 @@ static void test_matrix(void **state)
 	small_ff(&f);
 	struct ff_scene s = scene_of(&m);
 	assert_int_equal(ff_check(&f, &s, &e), 0);
-	assert_int_equal(patch_matrix_init(&pm, &f, &s, &e), 0);
+	assert_int_equal(ff_patch_matrix_init(&pm, &f, &s, &e), 0);
 	assert_int_equal(pm.sides, 3);
 	assert_int_equal(pm.unmodelled, 1);
-	patch_matrix_row(&pm, 0, row, &black, &escape);
+	ff_patch_matrix_row(&pm, 0, row, &black, &escape);
 	near(row[0], 0), near(row[1], .25), near(row[2], .25);
 	near(black, .125), near(escape, .375);
-	patch_matrix_row(&pm, 2, row, &black, &escape); /* a scaled row */
+	ff_patch_matrix_row(&pm, 2, row, &black, &escape); /* a scaled row */
 	near(row[0] + row[1] + row[2] + black + escape, 1);
-	patch_matrix_free(&pm);
-	f.row_kind[1] = FF_REFLECTED;
-	assert_int_equal(patch_matrix_init(&pm, &f, &s, &e), 0);
-	patch_matrix_row(&pm, 1, row, &black, &escape);
+	ff_patch_matrix_free(&pm);
+	f.row.kind[1] = FF_REFLECTED;
+	assert_int_equal(ff_patch_matrix_init(&pm, &f, &s, &e), 0);
+	ff_patch_matrix_row(&pm, 1, row, &black, &escape);
 	assert_true(isnan(row[0]) && isnan(escape));
-	patch_matrix_free(&pm);
+	ff_patch_matrix_free(&pm);
 	ff_free(&f);
 	model_free(&m);
 }
@@ -79,20 +79,20 @@ static void test_matrix_of_patches(void **state)
 	patches.entries = 6;
 	memcpy(patches.column, column, sizeof column);
 	memcpy(patches.value, value, sizeof value);
-	memcpy(patches.block_start, start, sizeof start);
+	memcpy(patches.block.start, start, sizeof start);
 	struct ff_scene s = scene_of(&m);
 	assert_int_equal(ff_check(&patches, &s, &e), 0);
-	assert_int_equal(verify_ff(&patches, &s, &v, &e), 0);
-	assert_int_equal(patch_matrix_init(&a, &elements, &s, &e), 0);
-	assert_int_equal(patch_matrix_init(&b, &patches, &s, &e), 0);
+	assert_int_equal(ff_verify(&patches, &s, &v, &e), 0);
+	assert_int_equal(ff_patch_matrix_init(&a, &elements, &s, &e), 0);
+	assert_int_equal(ff_patch_matrix_init(&b, &patches, &s, &e), 0);
 	for (size_t i = 0; i < 3; i++) {
-		patch_matrix_row(&a, i, row[0], &black[0], &escape[0]);
-		patch_matrix_row(&b, i, row[1], &black[1], &escape[1]);
+		ff_patch_matrix_row(&a, i, row[0], &black[0], &escape[0]);
+		ff_patch_matrix_row(&b, i, row[1], &black[1], &escape[1]);
 		assert_memory_equal(row[0], row[1], sizeof row[0]);
 		assert_true(black[0] == black[1] && escape[0] == escape[1]);
 	}
-	patch_matrix_free(&a);
-	patch_matrix_free(&b);
+	ff_patch_matrix_free(&a);
+	ff_patch_matrix_free(&b);
 	ff_free(&elements);
 	ff_free(&patches);
 	model_free(&m);
@@ -109,17 +109,17 @@ static void exchange(double f01, double f10, double error, struct verify *v)
 	uint64_t row_block[] = { 0, 1, 2 }, block_start[] = { 0, 1, 2 }, arrival[] = { 0, 0, 0 };
 	uint64_t chain_start[] = { 0, 0 };
 	uint8_t kind[] = { FF_DIFFUSE, FF_DIFFUSE }, front[] = { 1, 1 };
-	const struct ff f = { .chains = 1, .chain_most = 2, .chain_start = chain_start, .rows = 2, .row_side = side,
-		.row_kind = kind, .row_samples = samples, .row_scale = scale, .row_residual = nought,
-		.row_error = errors, .row_block = row_block, .blocks = 2, .block_chain = chain,
-		.block_start = block_start, .block_escape = escape, .block_black = zero,
-		.block_lost = zero, .block_cut = zero, .block_arrival = arrival, .entries = 2,
-		.column = column, .value64 = value, .patch_end = 2, .part = 1, .parts = 1 };
+	const struct ff f = { .chain.n = 1, .chain.most = 2, .chain.start = chain_start, .row.n = 2, .row.side = side,
+		.row.kind = kind, .row.samples = samples, .row.scale = scale, .row.residual = nought,
+		.row.error = errors, .row.block = row_block, .block.n = 2, .block.chain = chain,
+		.block.start = block_start, .block.escape = escape, .block.black = zero,
+		.block.lost = zero, .block.cut = zero, .block.arrival = arrival, .entries = 2,
+		.column = column, .value64 = value, .patch_end = 2, .shard = 1, .shards = 1 };
 	const struct ff_scene s = { 2, 2, 1, 0, start, area, front };
 	struct err e = { 0 };
 
 	assert_int_equal(ff_check(&f, &s, &e), 0);
-	assert_int_equal(verify_ff(&f, &s, v, &e), 0);
+	assert_int_equal(ff_verify(&f, &s, v, &e), 0);
 }
 
 static int all_good(const struct verify *v)
@@ -158,10 +158,10 @@ static void test_ledger(void **state)
 	(void)state;
 	small_model(&m);
 	small_solution(&s, &m);
-	verify_solution(&m, &s, &v);
+	solution_verify(&m, &s, &v);
 	assert_true(v.item[0].value <= 4 * DBL_EPSILON);
 	s.ledger[LEDGER_ESCAPED * 3 + 1] += 1e-10;
-	verify_solution(&m, &s, &v);
+	solution_verify(&m, &s, &v);
 	assert_false(verify_good(&v.item[0]));
 	solution_free(&s);
 	model_free(&m);
@@ -176,15 +176,15 @@ static void test_side_rows(void **state)
 	(void)state;
 	small_model(&m);
 	small_solution(&s, &m);
-	side_row(&m, &s, 0, &front);
-	side_row(&m, &s, 1, &back);
+	solution_side_row(&m, &s, 0, &front);
+	solution_side_row(&m, &s, 1, &back);
 	near(front.area, .25);
 	near(front.centre[0], .5), near(front.centre[1], 1. / 3);
 	near(front.normal[2], 1), near(back.normal[2], -1);
 	assert_false(signbit(back.normal[0]));
 	near(back.h[0], (.5 + .25 + .125) * 3); /* the ramps at row 1, band 0 */
 	near(back.m[0], .5 * back.h[0]);
-	side_row(&m, NULL, 4, &front);
+	solution_side_row(&m, NULL, 4, &front);
 	near(front.e[0], 100 * 3.14159265358979323846);
 	solution_free(&s);
 	model_free(&m);
@@ -200,13 +200,13 @@ static void spans(uint32_t first0, uint32_t count0, uint32_t first1, uint32_t co
 	float value[8] = { .125f, .125f, .125f, .125f, .125f, .125f, .125f, .125f }, nought[] = { 0 };
 	uint64_t row_block[] = { 0, 1 }, entries[] = { 0, 8 }, words[] = { 1 }, none[] = { 0, 0 };
 	uint8_t kind[] = { FF_DIFFUSE }, sides2[] = { 3 };
-	const struct ff f = { .chains = 1, .chain_most = 2, .chain_start = none, .rows = 1, .row_side = side,
-		.row_kind = kind, .row_samples = samples, .row_scale = one, .row_residual = nought,
-		.row_error = nought, .row_block = row_block, .blocks = 1, .block_chain = chain,
-		.block_start = entries, .block_column = words, .block_escape = zero,
-		.block_black = zero, .block_lost = zero, .block_cut = zero, .block_arrival = none,
+	const struct ff f = { .chain.n = 1, .chain.most = 2, .chain.start = none, .row.n = 1, .row.side = side,
+		.row.kind = kind, .row.samples = samples, .row.scale = one, .row.residual = nought,
+		.row.error = nought, .row.block = row_block, .block.n = 1, .block.chain = chain,
+		.block.start = entries, .block.column = words, .block.escape = zero,
+		.block.black = zero, .block.lost = zero, .block.cut = zero, .block.arrival = none,
 		.entries = 8, .columns = 4, .column = column, .value = value, .patch_end = 1,
-		.part = 1, .parts = 1 };
+		.shard = 1, .shards = 1 };
 	const struct ff_scene s = { 1, 8, 1, 0, start, area, sides2 };
 	struct err e = { 0 };
 

@@ -48,7 +48,7 @@ static void test_furnace(void **state)
 		for (size_t p = 0; p < 3 * 40 * 30; p++)
 			assert_true(fabs((double)im.pixel[p] * PI - 1) < 1e-6);
 		assert_true(s.cut < 1e-6 * s.radiance);
-		image_free(&im);
+		picture_image_free(&im);
 		stage_free(&t);
 	}
 }
@@ -71,7 +71,7 @@ static void test_cut_bound(void **state)
 		assert_true(missing > 0);
 		assert_true(missing <= s.cut * (1 + 1e-6));
 		assert_true(missing > .5 * s.cut); /* and the bound is not idle */
-		image_free(&im);
+		picture_image_free(&im);
 	}
 	stage_free(&t);
 }
@@ -97,26 +97,26 @@ static void test_layers(void **state)
 		assert_string_equal(im.name[c], name[c]);
 	for (size_t p = 0; p < 24 * 20; p++)
 		for (int c = 0; c < 3; c++) {
-			float sum = image_plane(&im, 3 + c)[p] + image_plane(&im, 6 + c)[p] +
-			            image_plane(&im, 9 + c)[p];
-			assert_true(fabsf(sum - image_plane(&im, c)[p]) < 1e-6f);
+			float sum = picture_image_plane(&im, 3 + c)[p] + picture_image_plane(&im, 6 + c)[p] +
+			            picture_image_plane(&im, 9 + c)[p];
+			assert_true(fabsf(sum - picture_image_plane(&im, c)[p]) < 1e-6f);
 		}
 	for (size_t j = 0; j < 20; j++)
 		for (size_t i = 0; i < 24; i++) {
 			double org[3], dir[3], n[3], x[3];
-			size_t p = j * 24 + i, element = (size_t)image_plane(&im, 16)[p];
-			camera_ray(&f, (double)i + .5, (double)j + .5, org, dir);
+			size_t p = j * 24 + i, element = (size_t)picture_image_plane(&im, 16)[p];
+			picture_camera_ray(&f, (double)i + .5, (double)j + .5, org, dir);
 			for (int k = 0; k < 3; k++)
-				n[k] = (double)image_plane(&im, 13 + k)[p];
+				n[k] = (double)picture_image_plane(&im, 13 + k)[p];
 			assert_true(v3_dot(n, dir) < 0 && fabs(v3_length(n) - 1) < 1e-6);
-			double t1 = (double)image_plane(&im, 12)[p] / v3_dot(dir, f.forward);
+			double t1 = (double)picture_image_plane(&im, 12)[p] / v3_dot(dir, f.forward);
 			v3_mad(org, t1, dir, x); /* Z leads to the element's plane */
-			v3_sub(x, &t.m.vertex[3 * (size_t)t.m.element[3 * element]], x);
+			v3_sub(x, &t.m.vertex[3 * (size_t)t.m.element.corner[3 * element]], x);
 			assert_true(fabs(v3_dot(x, n)) < 1e-5);
-			assert_true(image_plane(&im, 17)[p] ==
-			            (float)t.m.element_patch[element]);
+			assert_true(picture_image_plane(&im, 17)[p] ==
+			            (float)t.m.element.patch[element]);
 		}
-	image_free(&im);
+	picture_image_free(&im);
 	stage_free(&t);
 }
 
@@ -153,8 +153,8 @@ static void test_threads(void **state)
 	struct view_stats sb = render(&t, &f, &o, &b);
 	assert_memory_equal(a.pixel, b.pixel, 50 * 37 * 21 * sizeof *a.pixel);
 	assert_true(sa.rays == sb.rays && sa.radiance == sb.radiance && sa.cut == sb.cut);
-	image_free(&a);
-	image_free(&b);
+	picture_image_free(&a);
+	picture_image_free(&b);
 	stage_free(&t);
 }
 
@@ -167,7 +167,7 @@ static void test_sides(void **state)
 	wall(&t, LOBE_PAPER);
 	stage_end(&t, 0);
 	for (size_t i = 0; i < 8; i++) /* the wall: H front 2, back 3 */
-		t.s.indirect[2 * i] = 2, t.s.indirect[2 * i + 1] = 3;
+		t.s.irradiance.indirect[2 * i] = 2, t.s.irradiance.indirect[2 * i + 1] = 3;
 	use_method(&t, VIEW_MESH);
 	/* Front: rho_s = 0 there, tau_s of the back; the lamp below shines through. */
 	double front = .5 + (.1 * 2 + .25 * 3) / PI + .05 * 20;
@@ -231,17 +231,17 @@ static void test_background_and_bands(void **state)
 		int named = bands == 1 || bands == 3 ? 0 : bands;
 		assert_int_equal(im.channels, 3 + named + 2);
 		for (int c = 0; c < 3; c++)
-			assert_true(image_plane(&im, c)[40] == (float)(c < bands ? c + 1 : bands));
+			assert_true(picture_image_plane(&im, c)[40] == (float)(c < bands ? c + 1 : bands));
 		for (int b = 0; b < named; b++) {
 			char name[16];
 			snprintf(name, sizeof name, "band.%d", b);
-			assert_int_equal(image_channel(&im, name), 3 + b);
-			assert_true(image_plane(&im, 3 + b)[40] == (float)(b + 1));
+			assert_int_equal(picture_image_channel(&im, name), 3 + b);
+			assert_true(picture_image_plane(&im, 3 + b)[40] == (float)(b + 1));
 		}
 		assert_true(im.pixel[0] == 0); /* the corner looks past it */
-		assert_true(isinf(image_plane(&im, image_channel(&im, "Z"))[0]));
-		assert_true(image_plane(&im, image_channel(&im, "element"))[0] == -1);
-		image_free(&im);
+		assert_true(isinf(picture_image_plane(&im, picture_image_channel(&im, "Z"))[0]));
+		assert_true(picture_image_plane(&im, picture_image_channel(&im, "element"))[0] == -1);
+		picture_image_free(&im);
 		stage_free(&t);
 	}
 }

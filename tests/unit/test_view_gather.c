@@ -29,8 +29,8 @@ static void box(struct stage *t, double rho_s, double tau_s, size_t n)
 	grid_box(&t->m, n, material, lo, hi);
 	grid_quad(&t->m, n, 2, o, x, y);
 	stage_end(t, 0);
-	for (size_t i = 0; i < 2 * t->m.elements; i++)
-		t->s.indirect[i] = 1;
+	for (size_t i = 0; i < 2 * t->m.element.n; i++)
+		t->s.irradiance.indirect[i] = 1;
 	use_method(t, VIEW_GATHER);
 }
 
@@ -57,7 +57,7 @@ static void test_tails(void **state)
 		printf("# mirrors %g, panes %g: %g, %g off at most\n", rho_s, tau_s, mean, worst);
 		assert_true(fabs(mean - .5) < 2e-3);
 		assert_true(worst < .05);
-		image_free(&im);
+		picture_image_free(&im);
 		stage_free(&t);
 	}
 }
@@ -77,13 +77,13 @@ static void test_errors(void **state)
 		struct image im;
 		double stated = 0, off = 0;
 		box(&t, 0, 0, n);
-		for (size_t i = 0; i < 2 * t.m.elements; i++) {
-			t.s.error[i] = .3;
-			t.s.indirect[i] += .3 * sqrt(3) * (2 * (double)(i * 2654435761u % 1013) / 1012 - 1);
+		for (size_t i = 0; i < 2 * t.m.element.n; i++) {
+			t.s.error.sampling[i] = .3;
+			t.s.irradiance.indirect[i] += .3 * sqrt(3) * (2 * (double)(i * 2654435761u % 1013) / 1012 - 1);
 		}
 		use_method(&t, VIEW_GATHER);
 		render(&t, &f, &o, &im);
-		const float *error = image_plane(&im, image_channel(&im, "error.R"));
+		const float *error = picture_image_plane(&im, picture_image_channel(&im, "error.R"));
 		for (size_t p = 0; p < 30 * 30; p++) {
 			/* What each surface has gathered, were it not for noise, is .5. */
 			double right = .25 / PI;
@@ -93,7 +93,7 @@ static void test_errors(void **state)
 		printf("# %zu cells: %.3g %% off, stated %.2f of that\n", n * n, 100 * sqrt(off / 900) / .25 * PI,
 		       sqrt(stated / off));
 		assert_true(stated > .25 * off && stated < 4 * off);
-		image_free(&im);
+		picture_image_free(&im);
 		stage_free(&t);
 	}
 }

@@ -26,7 +26,7 @@ static void test_lobes(void **state)
 		set(&t.m, 0, BACK, 0, 0, 0, 0, k);
 		t.m.material.emission[0] = t.m.material.emission[1] = 0;
 		stage_end(&t, 0);
-		double x = sqrt(.75), a = lobe_albedo(k, cosine);
+		double x = sqrt(.75), a = bsdf_lobe_albedo(k, cosine);
 		double one = look(&t, &o, x, 0, .5, 0, 0, 0);
 		assert_true(fabs(one - 10 * .6 * (kind ? a : 1)) < 1e-4);
 		o.lobe_samples = 4096;
@@ -37,13 +37,13 @@ static void test_lobes(void **state)
 				double c = (i + .5) / 400, s = sqrt(1 - c * c);
 				double p = 2 * PI * (j + .5) / 400;
 				double g = -s * cos(p) * x + c * cosine;
-				double w = lobe_power(k, g) * 2 * PI / 160000.;
+				double w = bsdf_lobe_power(k, g) * 2 * PI / 160000.;
 				expected += w * c / (kind ? fmax(c, cosine)
-				                          : lobe_normaliser(k, c) * cosine);
+				                          : bsdf_lobe_normaliser(k, c) * cosine);
 				sum += w;
 			}
 		expected *= 10 * .6 * (kind ? (k + 1) / (2 * PI) : 1);
-		assert_true(fabs(sum / lobe_normaliser(k, cosine) - 1) < 1e-3);
+		assert_true(fabs(sum / bsdf_lobe_normaliser(k, cosine) - 1) < 1e-3);
 		assert_true(fabs(many / expected - 1) < 5e-3);
 		stage_free(&t);
 	}
@@ -67,8 +67,8 @@ static void gloss(struct stage *t, enum lobe_kind kind, double k, size_t n, doub
 	grid_quad(&t->m, n, 0, o, x, y);
 	grid_quad(&t->m, n, 1, up, px, py);
 	stage_end(t, 0);
-	for (size_t e = 2 * n * n; e < t->m.elements && lamp == 0; e++)
-		t->s.indirect[2 * e] = (double)(e * 2654435761u % 97) / 97;
+	for (size_t e = 2 * n * n; e < t->m.element.n && lamp == 0; e++)
+		t->s.irradiance.indirect[2 * e] = (double)(e * 2654435761u % 97) / 97;
 	use_method(t, VIEW_MESH);
 }
 
@@ -162,15 +162,15 @@ static void compare(const struct stage *t, int lobe_samples, double *stated, dou
 	render(t, &f, &o, &a);
 	o.lobe_samples = 1024;
 	render(t, &f, &o, &b);
-	const float *error = image_plane(&a, image_channel(&a, "error.R"));
+	const float *error = picture_image_plane(&a, picture_image_channel(&a, "error.R"));
 	for (size_t i = 0; i < 16 * 16; i++) {
 		double off = (double)a.pixel[i] - (double)b.pixel[i];
 		*stated += (double)error[i] * (double)error[i];
 		*true_error += off * off;
 		*all += (double)b.pixel[i] * (double)b.pixel[i];
 	}
-	image_free(&a);
-	image_free(&b);
+	picture_image_free(&a);
+	picture_image_free(&b);
 }
 
 static void test_lobe_errors(void **state)

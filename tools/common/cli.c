@@ -407,7 +407,7 @@ double cli_peak_megabytes(void)
 
 static void tidy_and_die(int signal_number)
 {
-	atomic_file_remove_temporaries();
+	file_atomic_remove_temporaries();
 	if (bar_on_screen && write(STDERR_FILENO, "\n", 1) < 0)
 		bar_on_screen = 0;
 	/* SA_RESETHAND restored the default action, which follows on return. */

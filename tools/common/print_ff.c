@@ -37,7 +37,7 @@ static void print_matrix_line(double *row, const struct patch_matrix *pm, double
 /* Sides without a row (black ones, other parts) have a column but no line. */
 static int csv_matrix(const struct ff_file *ff, const struct patch_matrix *pm, struct err *e)
 {
-	char **name = ff_file_side_names(ff, e);
+	char **name = file_ff_side_names(ff, e);
 	double black, escape, *row = mem_new(pm->sides, sizeof *row, "a row", e);
 	int failed = !name || !row;
 
@@ -49,12 +49,12 @@ static int csv_matrix(const struct ff_file *ff, const struct patch_matrix *pm, s
 	for (size_t i = 0; i < pm->sides && !failed; i++) {
 		if (pm->row[i] == FF_NO_ROW)
 			continue;
-		patch_matrix_row(pm, i, row, &black, &escape);
+		ff_patch_matrix_row(pm, i, row, &black, &escape);
 		print_csv(name[pm->side[i]], "");
 		print_matrix_line(row, pm, black, escape);
 	}
 	free(row);
-	cache_names_free(name, 2 * ff->scene.patches);
+	file_cache_names_free(name, 2 * ff->scene.patches);
 	return failed ? -1 : 0;
 }
 
@@ -63,20 +63,20 @@ static int npy_matrix(const struct patch_matrix *pm, const char *path, struct er
 {
 	const size_t columns = pm->sides + 1 + (size_t)pm->unmodelled;
 	const uint64_t shape[] = { pm->sides, columns };
-	struct atomic_file *f = atomic_file_create(path, e);
+	struct atomic_file *f = file_atomic_create(path, e);
 	double black, *row = mem_new(columns, sizeof *row, "a row", e);
-	int failed = !f || !row || npy_begin(f, DT_F64, 2, shape, e);
+	int failed = !f || !row || file_npy_begin(f, DT_F64, 2, shape, e);
 
 	for (size_t i = 0; i < pm->sides && !failed; i++) {
-		patch_matrix_row(pm, i, row, &black, &row[columns - 1]);
+		ff_patch_matrix_row(pm, i, row, &black, &row[columns - 1]);
 		if (pm->unmodelled)
 			row[columns - 2] = black;
-		failed = atomic_file_write(f, row, columns * sizeof *row, e);
+		failed = file_atomic_write(f, row, columns * sizeof *row, e);
 	}
 	free(row);
 	if (!failed)
-		return atomic_file_finish(f, e);
-	atomic_file_abandon(f);
+		return file_atomic_finish(f, e);
+	file_atomic_abandon(f);
 	return -1;
 }
 
@@ -84,10 +84,10 @@ int print_patch_matrix(const struct ff_file *ff, const char *npy, struct err *e)
 {
 	struct patch_matrix pm = { 0 };
 
-	if (patch_matrix_init(&pm, &ff->f, &ff->scene, e))
+	if (ff_patch_matrix_init(&pm, &ff->f, &ff->scene, e))
 		return -1;
 	int failed = npy ? npy_matrix(&pm, npy, e) : csv_matrix(ff, &pm, e);
-	patch_matrix_free(&pm);
+	ff_patch_matrix_free(&pm);
 	return failed;
 }
 
@@ -108,11 +108,11 @@ static void print_entries(const struct ff_file *ff, char *const *name, uint32_t 
 				patch = 0; /* the back's entries of a patch follow the front's */
 			while (!f->to_patches && receiver >= start[patch + 1])
 				patch++;
-			printf("%" PRIu32 ",", f->block_chain[b]);
+			printf("%" PRIu32 ",", f->block.chain[b]);
 			print_csv(name[f->to_patches ? column : 2 * patch + (column & 1)], ",");
 			if (!f->to_patches)
 				printf("%" PRIu32, receiver);
-			printf(",%.17g\n", f->row_scale[row] * ff_value(f, s.entry + k));
+			printf(",%.17g\n", f->row.scale[row] * ff_value(f, s.entry + k));
 		}
 }
 
@@ -123,14 +123,14 @@ static void print_block_lines(const struct ff_file *ff, char *const *name, uint3
 	const struct {
 		const char *where;
 		double value;
-	} rest[] = { { "escape", f->block_escape[b] }, { "black", f->block_black[b] },
-	             { "lost", f->block_lost[b] }, { "cut", f->block_cut[b] } };
+	} rest[] = { { "escape", f->block.escape[b] }, { "black", f->block.black[b] },
+	             { "lost", f->block.lost[b] }, { "cut", f->block.cut[b] } };
 
 	print_entries(ff, name, row, b);
 	for (size_t i = 0; i < sizeof rest / sizeof *rest; i++)
 		if (rest[i].value > 0)
-			printf("%" PRIu32 ",%s,,%.17g\n", f->block_chain[b], rest[i].where,
-			       f->row_scale[row] * rest[i].value);
+			printf("%" PRIu32 ",%s,,%.17g\n", f->block.chain[b], rest[i].where,
+			       f->row.scale[row] * rest[i].value);
 }
 
 int print_ff_row(const struct ff_file *ff, uint32_t row, struct err *e)
@@ -138,19 +138,19 @@ int print_ff_row(const struct ff_file *ff, uint32_t row, struct err *e)
 	static const char *const kind[] = { "diffuse", "emission", "reflected", "transmitted",
 	                                   "light" };
 	const struct ff *f = &ff->f;
-	const uint32_t source = f->row_side[row];
-	char **name = ff_file_side_names(ff, e);
+	const uint32_t source = f->row.side[row];
+	char **name = file_ff_side_names(ff, e);
 
 	if (!name)
 		return -1;
 	printf("row       %" PRIu32 "\nfrom      %s\nkind      %s\nsamples   %" PRIu32
 	       "\nscale     %.17g\nresidual  %.17g\nerror     %.17g\n\n", row,
-	       f->row_kind[row] == FF_LIGHT ? ff->light_name[source - 2 * ff->scene.patches]
-	                                    : name[source], kind[f->row_kind[row]], f->row_samples[row],
-	       f->row_scale[row], (double)f->row_residual[row], (double)f->row_error[row]);
+	       f->row.kind[row] == FF_LIGHT ? ff->light_name[source - 2 * ff->scene.patches]
+	                                    : name[source], kind[f->row.kind[row]], f->row.samples[row],
+	       f->row.scale[row], (double)f->row.residual[row], (double)f->row.error[row]);
 	printf("chain,to,element,value\n");
-	for (uint64_t b = f->row_block[row]; b < f->row_block[row + 1]; b++)
+	for (uint64_t b = f->row.block[row]; b < f->row.block[row + 1]; b++)
 		print_block_lines(ff, name, row, b);
-	cache_names_free(name, 2 * ff->scene.patches);
+	file_cache_names_free(name, 2 * ff->scene.patches);
 	return 0;
 }
