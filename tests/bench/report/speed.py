@@ -42,7 +42,8 @@ class Row:
         self.scene, self.method, self.name = scene.name, solution.method, solution.name
         self.solved = Solved(scene, solution, repeat)
         self.view = View(self.solved, " ".join(map(str, SMOOTH)), SMOOTH, repeat, further=True)
-        self.by_default = View(self.solved, "", CENTRES, repeat) if solution.ffcalc == words_of(*DEFAULTS) else None
+        default = solution.ffcalc == words_of(*DEFAULTS)
+        self.by_default = View(self.solved, "", CENTRES, repeat) if default else None
 
     def cells(self, ladders):
         solved, view, e = self.solved, self.view, self.view.errors
