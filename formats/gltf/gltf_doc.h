@@ -3,6 +3,7 @@
  *   gltf_source.c    bytes: the file, GLB chunks, buffers  -> struct gltf_source
  *   gltf_schema.c    types, ranges and references of the JSON (a table)
  *   gltf_load.cc     tinygltf: checked JSON                -> struct gltf_doc
+ *   gltf_json.c      texts and objects of the JSON that several parts need
  *   gltf_accessor.c  elements of accessors
  *   gltf_check.c     layout of buffers, accessors and primitives
  *   gltf_nodes.c     the node graph and its matrices
@@ -190,9 +191,6 @@ uint32_t gltf_sparse_index(const struct gltf_elements *v, size_t k);
 int gltf_materials(struct gltf_reader *g, struct model *m, struct err *e);
 
 /* ---- gltf_lights.c ---- */
-#define GLTF_LIGHTS "KHR_lights_punctual"
-/* The file's array of lights, NULL if there is none. */
-json_t *gltf_lights_json(const json_t *root);
 /* Fills m->light with the lights of the nodes reached; intensities are RGB. world:
  * [nodes][16]. 0, or -1 and e. */
 int gltf_lights(struct gltf_reader *g, struct model *m, const double *world,
@@ -200,9 +198,6 @@ int gltf_lights(struct gltf_reader *g, struct model *m, const double *world,
 
 /* ---- gltf_scene.c ---- */
 int gltf_scene(struct gltf_reader *g, struct model *m, struct err *e);
-/* Names not yet taken: `want`, else with #2, #3 … A malloc'd string, without
- * control characters. `taken` is a JSON object that remembers. */
-char *gltf_unique_name(json_t *taken, const char *want, struct err *e);
 
 /* ---- gltf_report.c ---- */
 /* Adds a note unless it is there already. */
@@ -210,10 +205,17 @@ int gltf_note(struct gltf_report *r, struct err *e, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 /* Notes on everything in the file that is not read. */
 int gltf_report_unread(struct gltf_reader *g, struct err *e);
+
+/* ---- gltf_json.c, on checked JSON ---- */
 /* Replaces control characters, so that a text stays on one line. */
 void gltf_one_line(char *text);
+/* Names not yet taken: `want`, else with #2, #3 … A malloc'd string, without
+ * control characters. `taken` is a JSON object that remembers. */
+char *gltf_unique_name(json_t *taken, const char *want, struct err *e);
+#define GLTF_LIGHTS "KHR_lights_punctual"
+/* The file's array of lights, NULL if there is none. */
+json_t *gltf_lights_json(const json_t *root);
 
-/* ---- helpers on checked JSON ---- */
 static inline const char *gltf_string(const json_t *o, const char *key)
 {
 	return json_string_value(json_object_get(o, key)); /* or NULL */

@@ -10,12 +10,6 @@ static const double half_pi = 1.57079632679489661923;
 
 enum { RGB = 3 };
 
-json_t *gltf_lights_json(const json_t *root)
-{
-	return json_object_get(json_object_get(json_object_get(root, "extensions"), GLTF_LIGHTS),
-	                       "lights");
-}
-
 /* Index of a node's light, or GLTF_NONE. */
 static int light_of(const struct gltf_reader *g, size_t node)
 {

@@ -9,13 +9,6 @@
 
 enum { NOTE = 512 };
 
-void gltf_one_line(char *text)
-{
-	for (unsigned char *p = (unsigned char *)text; *p; p++)
-		if (*p < 0x20 || *p == 0x7f)
-			*p = ' ';
-}
-
 int gltf_note(struct gltf_report *r, struct err *e, const char *format, ...)
 {
 	char text[NOTE];

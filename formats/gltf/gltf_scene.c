@@ -35,30 +35,6 @@ struct instance {
 
 /* ---- names ---- */
 
-char *gltf_unique_name(json_t *taken, const char *want, struct err *e)
-{
-	size_t size = strlen(want) + 24;
-	char *name = mem_new(size, 1, "a name", e);
-
-	if (!name)
-		return NULL;
-	snprintf(name, size, "%s", want);
-	gltf_one_line(name);
-	json_t *count = json_object_get(taken, name);
-	size_t n = strlen(name);
-	json_int_t k = count ? json_integer_value(count) : 0;
-	while (k && json_object_get(taken, name))
-		snprintf(name + n, size - n, "#%" JSON_INTEGER_FORMAT, ++k);
-	if (k)
-		json_integer_set(count, k);
-	if (json_object_set_new(taken, name, json_integer(1))) {
-		err_set(e, "out of memory for names");
-		free(name);
-		return NULL;
-	}
-	return name;
-}
-
 /* A node's name, else that of the mesh or camera it carries, else its kind and
  * number; with `suffix`. */
 static char *name_of(struct scene *s, size_t node, const char *array, int index,

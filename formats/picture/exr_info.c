@@ -1,8 +1,6 @@
 /* The attributes of a picture. */
-#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "formats/picture/exr_file.h"
 #include "lib/base/mem.h"
@@ -70,19 +68,4 @@ void file_exr_info_free(struct exr_file_info *i)
 	}
 	free(i->string);
 	*i = (struct exr_file_info){ 0 };
-}
-
-int file_exr_up_to_date(const char *path, const char *key)
-{
-	struct exr_file_info info = { 0 };
-	struct err ignored = { 0 };
-	struct stat st;
-
-	if (strcmp(path, "-") == 0 || stat(path, &st) || !S_ISREG(st.st_mode) ||
-	    file_exr_read_info(path, &info, &ignored))
-		return 0;
-	const char *has = file_exr_info_get(&info, EXR_FILE_KEY);
-	int same = has && strcmp(has, key) == 0;
-	file_exr_info_free(&info);
-	return same && utimensat(AT_FDCWD, path, NULL, 0) == 0;
 }

@@ -390,3 +390,18 @@ int file_exr_read_info(const char *path, struct exr_file_info *info, struct err 
 	file_exr_info_free(info);
 	return -1;
 }
+
+int file_exr_up_to_date(const char *path, const char *key)
+{
+	struct exr_file_info info = { 0 };
+	struct err ignored = { 0 };
+	struct stat st;
+
+	if (strcmp(path, "-") == 0 || stat(path, &st) || !S_ISREG(st.st_mode) ||
+	    file_exr_read_info(path, &info, &ignored))
+		return 0;
+	const char *has = file_exr_info_get(&info, EXR_FILE_KEY);
+	int same = has && strcmp(has, key) == 0;
+	file_exr_info_free(&info);
+	return same && utimensat(AT_FDCWD, path, NULL, 0) == 0;
+}

@@ -12,12 +12,16 @@
  *
  * A link is right for light that leaves its source evenly. Light that leaves a lobe does
  * not: its rays are followed on from where they land, through further lobes. */
+#include "lib/ff/directional.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "lib/base/vec3.h"
-#include "lib/ff/ff_job.h"
+#include "lib/ff/ray_follow.h"
+#include "lib/ff/ray_samples.h"
+#include "lib/ff/row_light.h"
 #include "lib/scatter/bsdf.h"
 #include "lib/scatter/lobe.h"
 
@@ -220,6 +224,12 @@ static int is_light(const struct ff_job *j, uint32_t source)
 	return source >= 2 * j->m->patch.n;
 }
 
+/* 1 if a source gives light of its own. */
+static int is_emitter(const struct ff_job *j, uint32_t source)
+{
+	return source >= 2 * j->m->patch.n || j->emits[source];
+}
+
 static void centroid(const struct model *m, uint32_t patch, double c[3])
 {
 	memset(c, 0, 3 * sizeof *c);
@@ -370,8 +380,8 @@ static size_t cluster_end(const struct ff_job *j, const struct ff_incident *c, s
 	while (end < n && c[end].chain == c[i].chain) {
 		uint32_t source = c[end].source;
 		if (source != c[i].source &&
-		    (j->o.centroid || *w >= enough || ff_emits(j, source) ||
-		     ff_emits(j, c[i].source) ||
+		    (j->o.centroid || *w >= enough || is_emitter(j, source) ||
+		     is_emitter(j, c[i].source) ||
 		     v3_dot(c[end].l, c[i].l) < narrow))
 			break;
 		while (end < n && c[end].chain == c[i].chain && c[end].source == source)
@@ -390,7 +400,7 @@ static uint32_t cluster_rays(const struct ff_job *j, uint32_t ps, const struct f
 {
 	double rays = share * j->o.lobe_rays, least = MIN_LOBE_RAYS;
 
-	if (ff_emits(j, c->source)) {
+	if (is_emitter(j, c->source)) {
 		double all = (double)j->o.lobe_rays * j->o.emitter_gain;
 		double lands = is_light(j, c->source) ? 1
 		             : share * j->m->patch.area[ps >> 1] / j->m->patch.area[c->source >> 1];
@@ -407,7 +417,7 @@ static size_t count_emitters(const struct ff_job *j, const struct ff_incident *c
 	size_t emitters = 0;
 
 	for (size_t i = 0; i < n; i++)
-		emitters += (size_t)ff_emits(j, c[i].source) &&
+		emitters += (size_t)is_emitter(j, c[i].source) &&
 		            (i == 0 || c[i].source != c[i - 1].source || c[i].chain != c[i - 1].chain);
 	return emitters;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "lib/ff/closure.h"
+#include "lib/ff/ff_stats.h"
 #include "lib/ff/row_remainder.h"
 #include "lib/occlusion/exchange.h"
 

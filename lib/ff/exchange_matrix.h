@@ -3,7 +3,7 @@
 #ifndef TWOPASS_EXCHANGE_MATRIX_H
 #define TWOPASS_EXCHANGE_MATRIX_H
 
-#include "lib/ff/ff_job.h"
+#include "lib/ff/ff_internal.h"
 
 /* 1 if a model is all plane patches without lobes, mirrors and panes. */
 int ff_exchange_matrix_can(const struct ff_job *j);

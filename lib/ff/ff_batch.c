@@ -1,9 +1,9 @@
-/* Batches of rows: put together, chain numbers and links made those of the whole. */
+#include "lib/ff/ff_batch.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "lib/data/link_key.h"
-#include "lib/ff/tally.h"
 
 int ff_batch_begin(struct ff_batch *b, struct err *e)
 {

@@ -1,7 +1,12 @@
 /* What all rows share, and what each thread has for itself: made, and freed. */
+#include "lib/ff/ff_job.h"
+
 #include <stdlib.h>
 
-#include "lib/ff/ff_job.h"
+#include "lib/ff/chain_limit.h"
+#include "lib/ff/ray_samples.h"
+#include "lib/ff/row_reciprocal.h"
+#include "lib/ff/sobol_points.h"
 #include "lib/scatter/bsdf.h"
 
 enum { FORMULA_EVALUATIONS = 1000, FORMULA_BODIES = 8 };

@@ -1,8 +1,10 @@
 /* Elements below a pixel: hemicubes of an emitter tell how much of its light comes to a
  * patch-side; how it is shared among elements that a pixel or two show, or none, the sample
  * points themselves find out, each by a line to the element. */
+#include "lib/ff/hemicube_subpixel.h"
+
 #include "lib/base/vec3.h"
-#include "lib/ff/ff_job.h"
+#include "lib/ff/ray_samples.h"
 
 #define PI 3.14159265358979323846
 

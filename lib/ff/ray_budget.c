@@ -3,9 +3,9 @@
  * The variance that rows of n rays with fluxes U bring to what they light is the sum of
  * U^2 / n, so that rays are best shared out as fluxes are. What is known of these before
  * anything is solved is where elements, as they gathered, met emitters. */
-#include <stdlib.h>
+#include "lib/ff/ray_budget.h"
 
-#include "lib/ff/ff_job.h"
+#include <stdlib.h>
 
 /* Flux on each patch-side from emitters that are alike: the parts of its elements' rays that
  * met one, times their areas. */

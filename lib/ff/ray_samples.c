@@ -1,10 +1,11 @@
-/* Where the rays of a row begin and go. The loops over a batch are written without
+/* Where the rays of a row begin, go and land. The loops that make a batch are without
  * branches and calls, so that compilers turn them into vector code. */
+#include "lib/ff/ray_samples.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "lib/base/vec3.h"
-#include "lib/ff/ff_job.h"
 
 #define PI 3.14159265358979323846
 
@@ -225,4 +226,44 @@ void ff_rays_directions(const struct ff_job *j, int side, uint32_t n, struct ff_
 		for (int k = 0; k < 3; k++)
 			b->ray.dir[k][i] = d[k];
 	}
+}
+
+struct ff_scramble ff_scramble(const struct ff_job *j, uint32_t row, uint32_t replicate)
+{
+	struct ff_scramble s;
+	uint64_t seed = rng_mix(rng_mix(j->o.seed) ^ rng_mix(((uint64_t)row << 8) | replicate));
+
+	for (int d = 0; d < FF_DIMS; d++)
+		s.seed[d] = rng_sobol_seed(seed, d);
+	return s;
+}
+
+/* Rays are made, cast, located and tallied by the batch: each loop then overlaps the
+ * latencies of many rays, where one ray at a time would wait for each in turn. */
+void ff_rays_cast(const struct ff_job *j, uint32_t n, struct ff_ray_batch *b)
+{
+	static const int32_t nowhere = ~0;
+	const struct locator *l = &j->locator;
+	const int32_t *way[RAY_BATCH]; /* where the search for an element begins */
+
+	ray_nearest_batch(j->rays, &b->ray, n);
+	for (uint32_t i = 0; i < n; i++) {
+		way[i] = b->ray.triangle[i] == RAY_MISS ? &nowhere
+		       : ray_locate_begin(l, b->ray.triangle[i], b->ray.w[0][i], b->ray.w[1][i]);
+		__builtin_prefetch(way[i]);
+	}
+	for (uint32_t i = 0; i < n; i++)
+		b->hit[i] = ray_locate_below(l, *way[i], b->ray.w[0][i], b->ray.w[1][i]);
+}
+
+void ff_rays_from_element(const struct ff_job *j, const struct ff_samples *s,
+                          const uint32_t seed[4], uint32_t column, uint32_t first,
+                          uint32_t n, struct ff_ray_batch *b)
+{
+	for (uint32_t i = 0; i < n; i++)
+		b->element[i] = column >> 1;
+	ff_rays_numbers(s, seed, first, n, b);
+	ff_rays_origins(j, (int)(column & 1), n, b);
+	ff_rays_directions(j, (int)(column & 1), n, b);
+	ff_rays_cast(j, n, b);
 }

@@ -1,10 +1,12 @@
 /* What an emitter lights: direct light is the brightest of a picture and the easiest to
  * get right, with pairs of points on the emitter and on each element. */
+#include "lib/ff/row_emitter.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "lib/base/vec3.h"
-#include "lib/ff/ff_job.h"
+#include "lib/ff/ray_samples.h"
 #include "lib/geometry/solid_angle.h"
 
 #define PI 3.14159265358979323846

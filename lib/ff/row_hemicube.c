@@ -3,11 +3,16 @@
  * paper's two-sided patches). Light that meets an ideal surface is followed by
  * rays through the pixels that see it; lobes are sampled with density cos^k and
  * looked up in the item buffer, so a lobe narrower than a pixel still lands. */
+#include "lib/ff/row_hemicube.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "lib/base/vec3.h"
-#include "lib/ff/ff_job.h"
+#include "lib/ff/directional.h"
+#include "lib/ff/hemicube_subpixel.h"
+#include "lib/ff/ray_follow.h"
+#include "lib/ff/ray_samples.h"
 #include "lib/scatter/lobe.h"
 
 enum {

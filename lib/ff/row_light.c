@@ -6,11 +6,15 @@
  * looked at likewise. What mirrors turn more often, or are not plane, is sampled with rays
  * of the light, which also tell whether any leaves the scene: if none does, values of elements
  * that see the light in part are fitted so that the row adds up. */
+#include "lib/ff/row_light.h"
+
 #include <math.h>
 
 #include "lib/base/vec3.h"
 #include "lib/data/punctual.h"
-#include "lib/ff/ff_job.h"
+#include "lib/ff/light_paths.h"
+#include "lib/ff/ray_follow.h"
+#include "lib/ff/ray_samples.h"
 #include "lib/geometry/solid_angle.h"
 #include "lib/scatter/bsdf.h"
 

@@ -3,13 +3,17 @@
  * sends there, and what they tell of all patch-sides together adds up to what the
  * element can see: its irradiance is an average with stratified samples, where landings
  * of other patches' rays come by chance. */
+#include "lib/ff/row_reciprocal.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "lib/base/mem.h"
 #include "lib/base/vec3.h"
-#include "lib/ff/ff_job.h"
+#include "lib/ff/ray_budget.h"
+#include "lib/ff/ray_samples.h"
+#include "lib/ff/row_emitter.h"
 
 /* An element's own rays tell what a patch-side sends it, if its area is small beside the
  * patch's, and if of rays between them so many are the element's, beside those that the

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "lib/ff/ray_samples.h"
+
 int ff_remainder_init(struct ff_rest *r, const struct ff_job *j, struct err *e)
 {
 	*r = (struct ff_rest){ 0 };

@@ -3,15 +3,10 @@
 #define TWOPASS_TALLY_H
 
 #include "lib/base/mem.h"
-#include "lib/data/ff.h"
 #include "lib/data/model.h"
+#include "lib/ff/ff_batch.h"
 #include "lib/ff/tally_chains.h"
 #include "lib/scatter/chain.h"
-
-/* Flux of a chain that reaches no modelled element-side. */
-struct tally_rest {
-	double escape, black, lost, cut;
-};
 
 /* Element-sides in the order of a block's entries: by patch-side, then element. */
 struct tally_places {
@@ -52,16 +47,6 @@ struct tally {
 	struct vec chain_slot;     /* uint32_t 1 + slot by chain, 0 = unused */
 	struct vec arrival;        /* struct tally_arrival */
 	struct err err;            /* out of memory, checked once a row */
-};
-
-/* Growing arrays of a struct ff. */
-struct ff_batch {
-	int f64;
-	struct vec row_side, row_kind, row_samples, row_scale, row_residual, row_error;
-	struct vec row_block, block_chain, block_start, escape, black, lost, cut;
-	struct vec block_arrival, column, value;
-	struct vec arrival_target, arrival_direction;
-	struct vec link_target, link_source, link_last, link_chain, link_direction, link_row;
 };
 
 /* O(elements). Marks the element-sides of patch-sides with apart[] set. */
@@ -121,39 +106,6 @@ void ff_tally_replicate(struct tally *t);
  * or with t->dependent as many independent ones, if fewer, as have that error. O(hits + log). 0, or -1 and e. */
 int ff_tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
                     enum ff_row_kind kind, uint32_t samples, double total, struct err *e);
-
-/* What a row says beside its blocks: as struct ff has it. */
-struct ff_batch_row {
-	uint32_t side;
-	enum ff_row_kind kind;
-	uint32_t samples;
-	double scale, residual, error;
-};
-
-/* A row is put piece by piece: begin, then for each block its values into reserved room and
- * its arrivals, then the block, last the row. 0, or -1 and e; ff_batch_put_value returns the
- * value as it is stored. */
-int ff_batch_begin(struct ff_batch *b, struct err *e);
-int ff_batch_reserve(struct ff_batch *b, size_t values, struct err *e);
-double ff_batch_put_value(struct ff_batch *b, uint32_t column, double value);
-
-/* The same for those of n values x (double, or float unless b->f64) that are above 0, times
- * `scale`; returns the sum of what is stored. */
-double ff_batch_put_values(struct ff_batch *b, const uint32_t *column, const void *x, size_t n,
-                           double scale);
-int ff_batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *rest,
-                       struct err *e);
-int ff_batch_put_row(struct ff_batch *b, const struct ff_batch_row *r, struct err *e);
-
-/* Chain numbers of the batch and order of links: local -> whole. `map` (vec of
- * uint32_t, CHAIN_NONE = not met yet) belongs to the thread whose chains these
- * are. Called in row order, so numbers do not depend on threads. */
-int ff_batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *map,
-                      struct chains *whole, struct err *e);
-
-/* The batch seen as a struct ff (borrowed arrays). */
-struct ff ff_batch_view(const struct ff_batch *b);
-void ff_batch_free(struct ff_batch *b);
 
 /* Order of chains by length, then counts: independent of their numbers. */
 int ff_chains_compare(const struct chains *c, uint32_t a, uint32_t b);

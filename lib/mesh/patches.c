@@ -7,7 +7,6 @@
 
 #include "lib/base/mem.h"
 #include "lib/base/vec3.h"
-#include "lib/geometry/half_edge.h"
 #include "lib/mesh/stages.h"
 
 enum { ELEMENTS_MIN = 4 }; /* of a patch that is halved, for each half */
@@ -30,20 +29,6 @@ struct divider {
 	struct vec todo;
 	struct err *e;
 };
-
-void mesh_division_extent(const struct division *d, uint32_t element, const double axis[3],
-                          double *lo, double *hi)
-{
-	const uint32_t *c = &d->m->element.corner[3 * (size_t)element];
-
-	*lo = INFINITY, *hi = -INFINITY;
-	for (int k = 0; k < 3; k++) {
-		double x[3];
-		v3_sub(&d->m->vertex[3 * (size_t)c[k]], d->centre, x);
-		*lo = fmin(*lo, v3_dot(x, axis));
-		*hi = fmax(*hi, v3_dot(x, axis));
-	}
-}
 
 /* Puts queue[begin, end) on the list of pieces, with its bounding box clipped to
  * that of the piece it is part of. */
@@ -272,27 +257,6 @@ static int divide(struct divider *d, uint32_t *patch, size_t *count)
 	return 0;
 }
 
-static void element_centroids(struct division *d)
-{
-	const struct model *m = d->m;
-	double lo[3], hi[3];
-
-	model_box(m, lo, hi);
-	v3_mad(lo, 1, hi, d->centre);
-	for (int k = 0; k < 3; k++)
-		d->centre[k] *= .5;
-	for (size_t i = 0; i < m->element.n; i++) {
-		const uint32_t *c = &m->element.corner[3 * i];
-		for (size_t k = 0; k < 3; k++) {
-			double x[3];
-			v3_sub(&m->vertex[3 * (size_t)c[k]], d->centre, x);
-			v3_mad(&d->centroid[3 * i], 1. / 3, x, &d->centroid[3 * i]);
-		}
-		v3_area(&m->vertex[3 * (size_t)c[0]], &m->vertex[3 * (size_t)c[1]],
-		        &m->vertex[3 * (size_t)c[2]], &d->area[3 * i]);
-	}
-}
-
 /* Puts the regions on the list: order becomes the elements by region. */
 static int push_regions(struct divider *d, size_t regions)
 {
@@ -347,46 +311,22 @@ static int push_patches(struct divider *d, const uint32_t *old, size_t patches,
 	return status;
 }
 
-/* Which regions the elements belong to. */
-static int assign_regions(struct divider *d, size_t *regions)
+static int divider_init(struct divider *d, const struct model *m, double size, double cos_cone,
+                        size_t *regions, struct err *e)
 {
-	struct division *v = &d->d;
-	uint32_t *region = mem_new(v->m->triangle.n, sizeof *region, "regions", d->e);
-	int status = region ? mesh_find_regions(v->m, v->size, v->cos_cone, region, &v->region,
-	                                        regions, d->e)
-	                    : -1;
-
-	v->element_region = mem_new(v->m->element.n, sizeof *v->element_region, "regions", d->e);
-	for (size_t i = 0; !status && v->element_region && i < v->m->element.n; i++)
-		v->element_region[i] = region[v->m->element.triangle[i]];
-	free(region);
-	return v->element_region ? status : -1;
-}
-
-static int allocate(struct divider *d)
-{
-	struct division *v = &d->d;
-	size_t n = v->m->element.n;
-
-	if (geo_half_edges_build(&v->g, v->m->element.corner, n, v->m->vertices, d->e))
+	*d = (struct divider){ .e = e };
+	if (division_init(&d->d, m, size, cos_cone, regions, e))
 		return -1;
-	v->centroid = mem_new(n, 3 * sizeof *v->centroid, "patches", d->e);
-	v->area = mem_new(n, 3 * sizeof *v->area, "patches", d->e);
-	d->order = mem_new(n, sizeof *d->order, "patches", d->e);
-	d->queue = mem_new(n, sizeof *d->queue, "patches", d->e);
-	d->label = mem_new(n, sizeof *d->label, "patches", d->e);
-	d->edge_label = mem_new(v->g.n, sizeof *d->edge_label, "patches", d->e);
-	return v->centroid && v->area && d->order && d->queue && d->label && d->edge_label ? 0
-	                                                                                   : -1;
+	d->order = mem_new(m->element.n, sizeof *d->order, "patches", e);
+	d->queue = mem_new(m->element.n, sizeof *d->queue, "patches", e);
+	d->label = mem_new(m->element.n, sizeof *d->label, "patches", e);
+	d->edge_label = mem_new(d->d.g.n, sizeof *d->edge_label, "patches", e);
+	return d->order && d->queue && d->label && d->edge_label ? 0 : -1;
 }
 
-static void release(struct divider *d)
+static void divider_free(struct divider *d)
 {
-	geo_half_edges_free(&d->d.g);
-	free(d->d.region);
-	free(d->d.element_region);
-	free(d->d.centroid);
-	free(d->d.area);
+	division_free(&d->d);
 	free(d->order);
 	free(d->queue);
 	free(d->label);
@@ -397,36 +337,27 @@ static void release(struct divider *d)
 int mesh_find_patches(const struct model *m, double size, double cos_cone, uint32_t *patch,
                       size_t *count, struct err *e)
 {
-	int status = -1;
+	struct divider d;
 	size_t regions;
-	struct divider d = { .d = { .m = m, .size = size, .cos_cone = cos_cone }, .e = e };
+	int bad = divider_init(&d, m, size, cos_cone, &regions, e);
 
 	*count = 0;
-	if (assign_regions(&d, &regions) || allocate(&d))
-		goto done;
-	element_centroids(&d.d);
-	if (push_regions(&d, regions) || divide(&d, patch, count))
-		goto done;
-	status = mesh_merge_patches(&d.d, patch, count, e);
-done:
-	release(&d);
-	return status;
+	bad = bad || push_regions(&d, regions) || divide(&d, patch, count) ||
+	      mesh_merge_patches(&d.d, patch, count, e);
+	divider_free(&d);
+	return bad ? -1 : 0;
 }
 
 int mesh_split_patches(const struct model *m, double size, double cos_cone, const uint32_t *old,
                        size_t patches, const uint8_t *halvings, uint32_t *patch, size_t *count,
                        struct err *e)
 {
-	int status = -1;
+	struct divider d;
 	size_t regions;
-	struct divider d = { .d = { .m = m, .size = size, .cos_cone = cos_cone }, .e = e };
+	int bad = divider_init(&d, m, size, cos_cone, &regions, e);
 
 	*count = 0;
-	if (!assign_regions(&d, &regions) && !allocate(&d)) {
-		element_centroids(&d.d);
-		status = push_patches(&d, old, patches, halvings) ||
-		         divide_further(&d, patch, count) ? -1 : 0;
-	}
-	release(&d);
-	return status;
+	bad = bad || push_patches(&d, old, patches, halvings) || divide_further(&d, patch, count);
+	divider_free(&d);
+	return bad ? -1 : 0;
 }

@@ -3,8 +3,8 @@
 #ifndef TWOPASS_STAGES_H
 #define TWOPASS_STAGES_H
 
-#include "lib/geometry/half_edge.h"
 #include "lib/geometry/weld.h"
+#include "lib/mesh/division.h"
 #include "lib/mesh/mesher.h"
 
 /* degenerate.c: drops triangles without area, makes vertices surface by surface and
@@ -94,28 +94,8 @@ int mesh_lobe_energies(const struct model *m, const struct solution *s,
 
 /* regions.c: sets region[t] of input triangles: connected pieces of one surface,
  * plane or bending by less than the cone at each edge. */
-struct region {
-	double axis[3][3];  /* its own frame; axis[2] is the mean normal */
-};
-
 int mesh_find_regions(const struct model *m, double size, double cos_cone, uint32_t *region,
                       struct region **regions, size_t *count, struct err *e);
-
-/* What patches are made from. */
-struct division {
-	const struct model *m;
-	struct half_edges g;           /* of the elements */
-	double centre[3];         /* of the scene: coordinates are taken from here */
-	double *centroid;         /* [elements][3] about the centre */
-	double *area;             /* [elements][3] area vectors */
-	struct region *region;
-	uint32_t *element_region; /* [elements] */
-	double size, cos_cone;
-};
-
-/* Range of an element along an axis. */
-void mesh_division_extent(const struct division *d, uint32_t element, const double axis[3],
-                          double *lo, double *hi);
 
 /* patch_merge.c: joins patches of one region that together are still small and flat
  * enough. O(n log n) for well-shaped patches. */

@@ -9,7 +9,7 @@
 #include "lib/occlusion/facet_set.h"
 #include "lib/scatter/bsdf.h"
 #include "lib/scatter/lobe.h"
-#include "lib/view/glossy.h"
+#include "lib/view/lobe_weight.h"
 
 /* ---- images ---- */
 

@@ -1,6 +1,6 @@
 /* Emitters as lobes see them by way of plane mirrors and clear panes: what a lobe samples may
  * not meet for long, so samples are aimed at their images, too, and both are weighed by how
- * likely either finds a way (private to lib/view*.c).
+ * likely either finds a way (private to lib/view).
  * Veach & Guibas, Optimally Combining Sampling Techniques, SIGGRAPH 1995: balance heuristic. */
 #ifndef TWOPASS_EMITTER_IMAGES_H
 #define TWOPASS_EMITTER_IMAGES_H

@@ -16,7 +16,7 @@
 
 #include "lib/base/err.h"
 #include "lib/base/parallel.h"
-#include "lib/view/specular_path.h"
+#include "lib/view/view_scene.h"
 
 struct gather;
 

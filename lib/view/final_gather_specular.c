@@ -5,7 +5,6 @@
 
 #include "lib/base/vec3.h"
 #include "lib/scatter/lobe.h"
-#include "lib/view/final_gather_rays.h"
 
 /* Rays of less weight are followed by as much less chance. */
 static const double worth_following = .25;
@@ -50,7 +49,7 @@ static int choose(const struct view_side *s, int bands, int side, struct gather_
 }
 
 /* A direction of a lobe in place of its axis; 0 if it is below the horizon. Weights as in
- * lib/view_lobe. */
+ * lobe_weight.c. */
 static int scatter(const struct view_lobe *lobe, enum lobe_kind kind, int bands, const double normal[3],
                    double cos_o, struct gather_going *g, double dir[3])
 {

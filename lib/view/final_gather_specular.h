@@ -1,13 +1,10 @@
-/* Gathering rays that go on after directional events (private to lib/gather*.c): one way at
- * each, chosen by what it carries, a batch at a time. */
+/* Gathering rays that go on after directional events (private to lib/view): one way at each,
+ * chosen by what it carries, a batch at a time. */
 #ifndef TWOPASS_FINAL_GATHER_SPECULAR_H
 #define TWOPASS_FINAL_GATHER_SPECULAR_H
 
 #include "lib/base/rng.h"
-#include "lib/data/solution.h"
-#include "lib/ray/ray.h"
-
-struct gather_table;
+#include "lib/view/final_gather_table.h"
 
 /* A ray that waits. */
 struct gather_going {

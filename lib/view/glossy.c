@@ -8,8 +8,6 @@
 #include "lib/scatter/lobe.h"
 #include "lib/view/shade_tile.h"
 
-static const double pi = 3.14159265358979323846;
-
 enum {
 	PARTS = 4,             /* of the samples, that a standard error comes from */
 	FIRST = 4, MOST = 64,  /* samples of a part where an error is aimed at */
@@ -22,50 +20,6 @@ static const double together = .8;
 
 /* Images of emitters are aimed at if they may bring such a part of the pixel's light. */
 static const double worth_aiming = .01;
-
-/* ---- the lobe as a weight ---- */
-
-/* lib/bsdf's f cos theta_i of a lobe with unit coefficient, over its density. */
-static double per_density(const struct view_lobe_seen *l, enum lobe_kind kind, double cos_i)
-{
-	return kind == LOBE_RECIPROCAL
-	     ? cos_i / fmax(cos_i, l->cosine)
-	     : cos_i / l->cosine * bsdf_lobe_table_normaliser(l->table, l->cosine) /
-	       bsdf_lobe_table_normaliser(l->table, cos_i);
-}
-
-/* That samples are taken by, of solid angle. */
-static double density(const struct view_lobe_seen *l, enum lobe_kind kind, const double dir[3])
-{
-	double power = bsdf_lobe_power(l->k, v3_dot(l->axis, dir));
-
-	return kind == LOBE_RECIPROCAL ? (l->k + 1) / (2 * pi) * power
-	                               : power / bsdf_lobe_table_normaliser(l->table, l->cosine);
-}
-
-static double weight_at(const double dir[3], const void *arg)
-{
-	const struct view_lobe_weight *w = arg;
-	double cos_i = v3_dot(w->l->normal, dir), power = bsdf_lobe_power(w->l->k, v3_dot(w->l->axis, dir));
-
-	if (!(cos_i > 0) || power == 0)
-		return 0;
-	return w->kind == LOBE_RECIPROCAL
-	     ? (w->l->k + 1) / (2 * pi) * power * cos_i / fmax(cos_i, w->l->cosine)
-	     : power * cos_i / (w->l->cosine * bsdf_lobe_table_normaliser(w->l->table, cos_i));
-}
-
-struct direct_weight view_lobe_weight(const struct view_lobe_weight *w)
-{
-	/* cos^k falls to exp(-1/2) over its width and to 1e-8 at its reach. */
-	struct direct_weight d = { .at = weight_at, .arg = w, .width = 1 / sqrt(w->l->k + 1),
-	                           .reach = acos(exp(-18.4 / fmax(w->l->k, 1e-9))) };
-
-	memcpy(d.axis, w->l->axis, sizeof d.axis);
-	return d;
-}
-
-/* ---- samples ---- */
 
 /* Sums over the samples of a part. */
 struct part {
@@ -114,7 +68,8 @@ static void follow_aimed(struct run *r, uint32_t i, struct part *to)
 	if (!(chance > 0))
 		return;
 	next->aimed = 1 + image;
-	follow(r, weight_at(next->dir, &weight) / (chance + density(r->l, weight.kind, next->dir)), to);
+	chance += view_lobe_density(r->l, weight.kind, next->dir);
+	follow(r, view_lobe_weight_at(next->dir, &weight) / chance, to);
 	next->aimed = 0;
 }
 
@@ -136,11 +91,11 @@ static void follow_sample(struct run *r, uint32_t i, struct part *to)
 	if (!(cos_i > 0))
 		return;
 	if (!to) {
-		view_push(w, r->b, next, r->coefficient, per_density(l, kind, cos_i));
+		view_push(w, r->b, next, r->coefficient, view_lobe_per_density(l, kind, cos_i));
 		return;
 	}
-	next->density = density(l, kind, next->dir);
-	follow(r, per_density(l, kind, cos_i), to);
+	next->density = view_lobe_density(l, kind, next->dir);
+	follow(r, view_lobe_per_density(l, kind, cos_i), to);
 }
 
 static void follow_both(struct run *r, uint32_t i, struct part *to)
@@ -300,7 +255,7 @@ void view_lobe_probe(struct view_walker *w, const struct view_branch *b,
 	memcpy(directional, w->directional, sizeof directional);
 	memcpy(cut, w->cut, sizeof cut);
 	next.lobes = next.straight = 1;
-	next.density = density(l, w->v->m->lobe, l->axis);
+	next.density = view_lobe_density(l, w->v->m->lobe, l->axis);
 	follow(&r, scale, &one);
 	for (uint32_t i = 0; i < 2 * PROBES; i++)
 		follow_sample(&r, i, &r.part[i / PROBES]);

@@ -2,7 +2,7 @@
 #ifndef TWOPASS_HIGHLIGHTS_H
 #define TWOPASS_HIGHLIGHTS_H
 
-#include "lib/view/specular_path.h"
+#include "lib/view/view_scene.h"
 
 /* Radiance into l[bands] that the finite lobes at a point x, n its front normal, send
  * along `out` of what comes from punctual lights, also by plane mirrors and through clear

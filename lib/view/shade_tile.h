@@ -6,8 +6,8 @@
 
 #include "lib/base/mem.h"
 #include "lib/view/final_gather.h"
-#include "lib/view/glossy.h"
-#include "lib/view/specular_path.h"
+#include "lib/view/lobe_weight.h"
+#include "lib/view/view_scene.h"
 
 /* A point whose diffuse light goes, by `weight`, into a sample's diffuse or directional
  * part. */

@@ -11,6 +11,10 @@
 #include "lib/view/highlights.h"
 #include "lib/view/shade_tile.h"
 
+/* Up to how many directional events from the eye light is computed rather than
+ * interpolated; behind a lobe that is sampled it is always interpolated. */
+enum { VIEW_COMPUTED_DEPTH = 4 };
+
 /* Backs of one-sided materials in a row that a ray may pass. */
 enum { PASSES_MAX = 4096 };
 
@@ -23,12 +27,6 @@ struct point {
 	double cosine;      /* |n.dir| */
 	double way;         /* to it */
 };
-
-size_t view_stack_size(const struct view_options *o)
-{
-	/* Every level leaves at most one branch waiting for each one it goes on with. */
-	return 2 * (size_t)o->depth + 4;
-}
 
 /* 1 if the ray meets a surface. */
 static int meet(const struct view_scene *v, const double org[3], const double dir[3],
@@ -189,26 +187,6 @@ static void add_highlights(struct view_walker *w, const struct view_branch *b,
 		w->directional[i] += b->weight[i] * l[i];
 }
 
-void view_push(struct view_walker *w, const struct view_branch *b, struct view_branch *next,
-               const double *coefficient, double scale)
-{
-	int bands = w->v->m->bands;
-	double most = 0;
-
-	next->depth = b->depth + 1;
-	for (int i = 0; i < bands; i++) {
-		next->weight[i] = b->weight[i] * coefficient[i] * scale;
-		most = fmax(most, next->weight[i]);
-	}
-	if (next->depth <= w->o->depth && most >= w->o->cutoff * next->share && most > 0) {
-		w->stack[w->waiting++] = *next;
-		return;
-	}
-	for (int i = 0; i < bands; i++)
-		if (next->weight[i] > 0)
-			w->cut[i] += next->weight[i] * w->v->ceiling[i];
-}
-
 /* Follows a finite lobe, by samples or by one ray about its axis. */
 static void branch_into(struct view_walker *w, const struct view_branch *b, const struct point *p,
                         const struct view_lobe *lobe, int side, struct view_branch *next)
@@ -317,14 +295,6 @@ static void follow_branch(struct view_walker *w, const struct view_branch *b)
 		branch_off(w, b, &p, &s->transmitted, 1);
 }
 
-void view_run(struct view_walker *w, size_t below)
-{
-	while (w->waiting > below) {
-		struct view_branch b = w->stack[--w->waiting];
-		follow_branch(w, &b);
-	}
-}
-
 void view_follow(struct view_walker *w, struct view_branch *b)
 {
 	for (int i = 0; i < w->v->m->bands; i++)
@@ -332,6 +302,7 @@ void view_follow(struct view_walker *w, struct view_branch *b)
 	b->depth = b->lobes = b->straight = 0;
 	b->passes = 1;
 	b->share = 1;
+	w->step = follow_branch;
 	follow_branch(w, b);
 	view_run(w, 0);
 }

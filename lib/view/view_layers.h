@@ -1,4 +1,4 @@
-/* Channels of a picture (private to lib/view*.c). */
+/* Channels of a picture (private to lib/view). */
 #ifndef TWOPASS_VIEW_LAYERS_H
 #define TWOPASS_VIEW_LAYERS_H
 

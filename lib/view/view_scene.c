@@ -1,10 +1,10 @@
-/* What all views of a scene share. */
+#include "lib/view/view_scene.h"
+
 #include <math.h>
 #include <stdlib.h>
 
 #include "lib/base/mem.h"
 #include "lib/interpolate/discretisation.h"
-#include "lib/view/specular_path.h"
 
 static const double pi = 3.14159265358979323846;
 

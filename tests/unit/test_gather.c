@@ -9,6 +9,8 @@
 #include <cmocka.h>
 
 #include "lib/ff/ff_job.h"
+#include "lib/ff/ray_budget.h"
+#include "lib/ff/row_reciprocal.h"
 #include "tests/unit/fixtures/memory_ff.h"
 #include "tests/unit/fixtures/shapes.h"
 

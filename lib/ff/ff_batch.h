@@ -1,0 +1,58 @@
+/* Batches of rows: put together, chain numbers and links made those of the whole
+ * (private to lib/ff). */
+#ifndef TWOPASS_FF_BATCH_H
+#define TWOPASS_FF_BATCH_H
+
+#include "lib/base/mem.h"
+#include "lib/data/ff.h"
+#include "lib/scatter/chain.h"
+
+/* Growing arrays of a struct ff. */
+struct ff_batch {
+	int f64;
+	struct vec row_side, row_kind, row_samples, row_scale, row_residual, row_error;
+	struct vec row_block, block_chain, block_start, escape, black, lost, cut;
+	struct vec block_arrival, column, value;
+	struct vec arrival_target, arrival_direction;
+	struct vec link_target, link_source, link_last, link_chain, link_direction, link_row;
+};
+
+/* Flux of a chain that reaches no modelled element-side. */
+struct tally_rest {
+	double escape, black, lost, cut;
+};
+
+/* What a row says beside its blocks: as struct ff has it. */
+struct ff_batch_row {
+	uint32_t side;
+	enum ff_row_kind kind;
+	uint32_t samples;
+	double scale, residual, error;
+};
+
+/* A row is put piece by piece: begin, then for each block its values into reserved room and
+ * its arrivals, then the block, last the row. 0, or -1 and e; ff_batch_put_value returns the
+ * value as it is stored. */
+int ff_batch_begin(struct ff_batch *b, struct err *e);
+int ff_batch_reserve(struct ff_batch *b, size_t values, struct err *e);
+double ff_batch_put_value(struct ff_batch *b, uint32_t column, double value);
+
+/* The same for those of n values x (double, or float unless b->f64) that are above 0, times
+ * `scale`; returns the sum of what is stored. */
+double ff_batch_put_values(struct ff_batch *b, const uint32_t *column, const void *x, size_t n,
+                           double scale);
+int ff_batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *rest,
+                       struct err *e);
+int ff_batch_put_row(struct ff_batch *b, const struct ff_batch_row *r, struct err *e);
+
+/* Chain numbers of the batch and order of links: local -> whole. `map` (vec of
+ * uint32_t, CHAIN_NONE = not met yet) belongs to the thread whose chains these
+ * are. Called in row order, so numbers do not depend on threads. */
+int ff_batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *map,
+                      struct chains *whole, struct err *e);
+
+/* The batch seen as a struct ff (borrowed arrays). */
+struct ff ff_batch_view(const struct ff_batch *b);
+void ff_batch_free(struct ff_batch *b);
+
+#endif

@@ -1,0 +1,47 @@
+#include "lib/view/lobe_weight.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "lib/base/vec3.h"
+#include "lib/scatter/lobe.h"
+
+static const double pi = 3.14159265358979323846;
+
+double view_lobe_per_density(const struct view_lobe_seen *l, enum lobe_kind kind, double cos_i)
+{
+	return kind == LOBE_RECIPROCAL
+	     ? cos_i / fmax(cos_i, l->cosine)
+	     : cos_i / l->cosine * bsdf_lobe_table_normaliser(l->table, l->cosine) /
+	       bsdf_lobe_table_normaliser(l->table, cos_i);
+}
+
+double view_lobe_density(const struct view_lobe_seen *l, enum lobe_kind kind, const double dir[3])
+{
+	double power = bsdf_lobe_power(l->k, v3_dot(l->axis, dir));
+
+	return kind == LOBE_RECIPROCAL ? (l->k + 1) / (2 * pi) * power
+	                               : power / bsdf_lobe_table_normaliser(l->table, l->cosine);
+}
+
+double view_lobe_weight_at(const double dir[3], const void *arg)
+{
+	const struct view_lobe_weight *w = arg;
+	double cos_i = v3_dot(w->l->normal, dir), power = bsdf_lobe_power(w->l->k, v3_dot(w->l->axis, dir));
+
+	if (!(cos_i > 0) || power == 0)
+		return 0;
+	return w->kind == LOBE_RECIPROCAL
+	     ? (w->l->k + 1) / (2 * pi) * power * cos_i / fmax(cos_i, w->l->cosine)
+	     : power * cos_i / (w->l->cosine * bsdf_lobe_table_normaliser(w->l->table, cos_i));
+}
+
+struct direct_weight view_lobe_weight(const struct view_lobe_weight *w)
+{
+	/* cos^k falls to exp(-1/2) over its width and to 1e-8 at its reach. */
+	struct direct_weight d = { .at = view_lobe_weight_at, .arg = w, .width = 1 / sqrt(w->l->k + 1),
+	                           .reach = acos(exp(-18.4 / fmax(w->l->k, 1e-9))) };
+
+	memcpy(d.axis, w->l->axis, sizeof d.axis);
+	return d;
+}
