@@ -179,15 +179,46 @@ static int hardly_smaller(const exr_encode_pipeline_t *p)
 	return p->compressed_bytes > p->packed_bytes - p->packed_bytes / 8;
 }
 
+enum { SKIPPED = 7 }; /* chunks left as they are after one that was hardly smaller */
+
+/* The encoder of chunks, and how it compresses. */
+struct encoder {
+	exr_encode_pipeline_t pipe;
+	exr_result_t (*compress)(exr_encode_pipeline_t *);
+	int skip; /* so many chunks are left as they are before compression is tried again */
+};
+
+/* Writes the chunk that begins with row y. */
+static int write_chunk(struct output *o, int y, struct encoder *c)
+{
+	exr_chunk_info_t chunk;
+
+	if (check(o, exr_write_scanline_chunk_info(o->context, 0, y, &chunk)))
+		return -1;
+	if (check(o, y ? exr_encoding_update(o->context, 0, &chunk, &c->pipe)
+	               : exr_encoding_initialize(o->context, 0, &chunk, &c->pipe)))
+		return -1;
+	set_rows(o, &c->pipe);
+	if (y == 0) {
+		if (check(o, exr_encoding_choose_default_routines(o->context, 0, &c->pipe)))
+			return -1;
+		c->compress = c->pipe.compress_fn;
+	}
+	c->pipe.compress_fn = c->skip ? NULL : c->compress;
+	if (check(o, exr_encoding_run(o->context, 0, &c->pipe)))
+		return -1;
+	if (c->skip)
+		c->skip--;
+	else if (o->compression == EXR_FILE_AUTO && hardly_smaller(&c->pipe))
+		c->skip = SKIPPED;
+	return 0;
+}
+
 static int write_rows(struct output *o)
 {
-	enum { SKIPPED = 7 }; /* chunks left as they are before compression is tried again */
-	exr_result_t (*compress)(exr_encode_pipeline_t *) = NULL;
-	int skip = 0;
-	exr_encode_pipeline_t pipe = EXR_ENCODE_PIPELINE_INITIALIZER;
-	exr_chunk_info_t chunk;
+	struct encoder c = { .pipe = EXR_ENCODE_PIPELINE_INITIALIZER };
 	int32_t lines;
-	int status = -1;
+	int bad = 0;
 
 	if (check(o, exr_get_scanlines_per_chunk(o->context, 0, &lines)))
 		return -1;
@@ -197,30 +228,10 @@ static int write_rows(struct output *o)
 		if (!o->rows)
 			return -1;
 	}
-	for (int y = 0; y < o->im->height; y += lines) {
-		if (check(o, exr_write_scanline_chunk_info(o->context, 0, y, &chunk)))
-			goto done;
-		if (check(o, y ? exr_encoding_update(o->context, 0, &chunk, &pipe)
-		               : exr_encoding_initialize(o->context, 0, &chunk, &pipe)))
-			goto done;
-		set_rows(o, &pipe);
-		if (y == 0) {
-			if (check(o, exr_encoding_choose_default_routines(o->context, 0, &pipe)))
-				goto done;
-			compress = pipe.compress_fn;
-		}
-		pipe.compress_fn = skip ? NULL : compress;
-		if (check(o, exr_encoding_run(o->context, 0, &pipe)))
-			goto done;
-		if (skip)
-			skip--;
-		else if (o->compression == EXR_FILE_AUTO && hardly_smaller(&pipe))
-			skip = SKIPPED;
-	}
-	status = 0;
-done:
-	exr_encoding_destroy(o->context, &pipe);
-	return status;
+	for (int y = 0; !bad && y < o->im->height; y += lines)
+		bad = write_chunk(o, y, &c);
+	exr_encoding_destroy(o->context, &c.pipe);
+	return bad;
 }
 
 /* What the library would not say clearly. */

@@ -22,47 +22,64 @@ double solution_exitance(const struct model *m, const struct solution *s,
 	       mt->tau_d[there] * solution_irradiance(s, element_side ^ 1, band);
 }
 
-static int check_numbers(const char *name, const double *v, size_t n, int signs,
-                         struct err *e)
+static int check_sizes(const struct model *m, const struct solution *s, struct err *e)
 {
-	for (size_t i = 0; i < n; i++)
-		if (!isfinite(v[i]) || (v[i] < 0 && !signs))
-			return err_set(e, "array %s: value %zu is %g", name, i, v[i]);
+	if (s->bands != m->bands || s->element_sides != 2 * m->element.n ||
+	    s->patch_sides != 2 * m->patch.n || s->sources != model_sources(m) ||
+	    s->groups < 1)
+		return err_set(e, "array irradiance_direct: it is not that of the model's elements");
+	if (s->groups > CHANNELS_MAX / (size_t)s->bands)
+		return err_set(e, "array irradiance_direct: more than %zu light groups",
+		               CHANNELS_MAX / (size_t)s->bands);
+	for (size_t i = 0; i < s->emitters; i++)
+		if (s->emitter_group[i] >= s->groups)
+			return err_set(e, "array emitter_group: value %zu is %u", i,
+			               s->emitter_group[i]);
+	return 0;
+}
+
+/* An array of finite numbers, with signs or without. */
+struct numbers {
+	const char *name;
+	const double *v;
+	size_t n;
+	int signs;
+};
+
+static int check_numbers(const struct numbers *x, struct err *e)
+{
+	for (size_t i = 0; i < x->n; i++)
+		if (!isfinite(x->v[i]) || (x->v[i] < 0 && !x->signs))
+			return err_set(e, "array %s: value %zu is %g", x->name, i, x->v[i]);
 	return 0;
 }
 
 int solution_check(const struct model *m, const struct solution *s, struct err *e)
 {
+	if (check_sizes(m, s, e))
+		return -1;
 	size_t bands = (size_t)s->bands, sides = s->element_sides * bands;
 	size_t channels = solution_channels(s);
+	const struct numbers array[] = {
+		{ "irradiance_direct", s->irradiance.direct, s->groups * sides, 0 },
+		{ "irradiance_caustic", s->irradiance.caustic, s->groups * sides, 0 },
+		{ "irradiance_indirect", s->irradiance.indirect, s->groups * sides, 0 },
+		{ "irradiance_error", s->error.sampling, sides, 0 },
+		{ "irradiance_error_direct", s->error.sampling_direct, sides, 0 },
+		{ "irradiance_discretisation_direct", s->error.discretisation_direct, sides, 0 },
+		{ "irradiance_discretisation", s->error.discretisation, sides, 0 },
+		{ "unshot_emission", s->unshot.emission, s->sources * bands, 1 },
+		{ "unshot_diffuse", s->unshot.diffuse, s->patch_sides * channels, 1 },
+		{ "unshot_link", s->unshot.link, 2 * s->links * channels, 1 },
+		{ "shot", s->shot, 2 * s->rows * channels, 0 },
+		{ "round", s->round, ROUND_TERMS, 0 },
+		{ "ledger", s->ledger, LEDGER_TERMS * channels, 1 },
+	};
 
-	if (s->bands != m->bands || s->element_sides != 2 * m->element.n ||
-	    s->patch_sides != 2 * m->patch.n || s->sources != model_sources(m) ||
-	    s->groups < 1)
-		return err_set(e, "array irradiance_direct: it is not that of the model's elements");
-	if (s->groups > CHANNELS_MAX / bands)
-		return err_set(e, "array irradiance_direct: more than %zu light groups",
-		               CHANNELS_MAX / bands);
-	for (size_t i = 0; i < s->emitters; i++)
-		if (s->emitter_group[i] >= s->groups)
-			return err_set(e, "array emitter_group: value %zu is %u", i,
-			               s->emitter_group[i]);
-	return check_numbers("irradiance_direct", s->irradiance.direct, s->groups * sides, 0, e) ||
-	       check_numbers("irradiance_caustic", s->irradiance.caustic, s->groups * sides, 0, e) ||
-	       check_numbers("irradiance_indirect", s->irradiance.indirect, s->groups * sides, 0, e) ||
-	       check_numbers("irradiance_error", s->error.sampling, sides, 0, e) ||
-	       check_numbers("irradiance_error_direct", s->error.sampling_direct, sides, 0, e) ||
-	       check_numbers("irradiance_discretisation_direct", s->error.discretisation_direct, sides,
-	                     0, e) ||
-	       check_numbers("irradiance_discretisation", s->error.discretisation, sides, 0, e) ||
-	       check_numbers("unshot_emission", s->unshot.emission, s->sources * bands, 1,
-	                     e) ||
-	       check_numbers("unshot_diffuse", s->unshot.diffuse, s->patch_sides * channels, 1,
-	                     e) ||
-	       check_numbers("unshot_link", s->unshot.link, 2 * s->links * channels, 1, e) ||
-	       check_numbers("shot", s->shot, 2 * s->rows * channels, 0, e) ||
-	       check_numbers("round", s->round, ROUND_TERMS, 0, e) ||
-	       check_numbers("ledger", s->ledger, LEDGER_TERMS * channels, 1, e) ? -1 : 0;
+	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
+		if (check_numbers(&array[i], e))
+			return -1;
+	return 0;
 }
 
 double solution_mean_error(const struct model *m, const struct solution *s)

@@ -367,47 +367,65 @@ int ff_exchange_matrix_can(const struct ff_job *j)
 	return 1;
 }
 
+static int matrix_init(struct matrix *m, const struct ff_job *j, struct err *e)
+{
+	const struct exchange_options o = { .relative = j->o.f64 ? 1e-9 : 8e-7,
+	                                    .absolute = j->o.target, .most = j->o.evaluations,
+	                                    .bodies = SHAFT_OCCLUDERS, .crowd_rays = CROWD_RAYS };
+
+	*m = (struct matrix){ .job = j };
+	if (find_sides(m, e) || occ_facet_set_init(&m->facets, j->m, FACETS_OF_PATCHES, e) ||
+	    occ_occluder_set_init(&m->bodies, j->m, e) || tabulate(m, o.relative, e))
+		return -1;
+	occ_facet_centre(j->m, m->centre);
+	for (size_t i = 0; i < m->n; i++)
+		m->curved |= is_curved(m, i);
+	m->thread = mem_new((size_t)j->o.threads, sizeof *m->thread, "threads", e);
+	if (!m->thread)
+		return -1;
+	for (int t = 0; t < j->o.threads; t++) {
+		occ_exchanger_init(&m->thread[t].x, &o, &m->bodies, j->rays, m->centre);
+		if (ff_remainder_init(&m->thread[t].rest, j, e))
+			return -1;
+	}
+	return 0;
+}
+
+static void matrix_free(struct matrix *m)
+{
+	for (int t = 0; m->thread && t < m->job->o.threads; t++) {
+		occ_exchanger_free(&m->thread[t].x);
+		ff_remainder_free(&m->thread[t].rest);
+		free(m->thread[t].doubt.data);
+	}
+	free(m->thread);
+	free(m->side);
+	free(m->area);
+	free(m->row);
+	free(m->rest);
+	free(m->closed);
+	free(m->doubt.data);
+	geo_pair_table_free(&m->table);
+	occ_facet_set_free(&m->facets);
+	occ_occluder_set_free(&m->bodies);
+}
+
 int ff_exchange_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct ff_sink *sink,
                        struct ff_stats *stats, const struct progress *progress, struct err *e)
 {
-	struct matrix m = { .job = j };
-	struct exchange_options o = { .relative = j->o.f64 ? 1e-9 : 8e-7, .absolute = j->o.target,
-	                              .most = j->o.evaluations, .bodies = SHAFT_OCCLUDERS,
-	                              .crowd_rays = CROWD_RAYS };
+	struct matrix m;
 	size_t a = 0, b;
-	int bad = find_sides(&m, e) || occ_facet_set_init(&m.facets, j->m, FACETS_OF_PATCHES, e) ||
-	          occ_occluder_set_init(&m.bodies, j->m, e) || tabulate(&m, o.relative, e);
+	int bad = matrix_init(&m, j, e);
 
-	occ_facet_centre(j->m, m.centre);
-	for (size_t i = 0; !bad && i < m.n; i++)
-		m.curved |= is_curved(&m, i);
-	m.thread = mem_new((size_t)j->o.threads, sizeof *m.thread, "threads", e);
-	bad = bad || !m.thread;
-	for (int t = 0; !bad && t < j->o.threads; t++) {
-		occ_exchanger_init(&m.thread[t].x, &o, &m.bodies, j->rays, m.centre);
-		bad = ff_remainder_init(&m.thread[t].rest, j, e);
-	}
-	while (a < m.n && m.side[a] < 2 * begin)
+	while (!bad && a < m.n && m.side[a] < 2 * begin)
 		a++;
-	for (b = a; b < m.n && m.side[b] < 2 * end;)
+	for (b = a; !bad && b < m.n && m.side[b] < 2 * end;)
 		b++;
 	bad = bad || bands(&m, a, b, sink, stats, progress, e);
-	for (int t = 0; m.thread && t < j->o.threads; t++) {
+	for (int t = 0; !bad && t < j->o.threads; t++) {
 		ff_stats_count_pairs(stats, &m.thread[t].x.counts);
 		stats->rays += m.thread[t].rest.rays;
-		occ_exchanger_free(&m.thread[t].x);
-		ff_remainder_free(&m.thread[t].rest);
-		free(m.thread[t].doubt.data);
 	}
-	free(m.thread);
-	free(m.side);
-	free(m.area);
-	free(m.row);
-	free(m.rest);
-	free(m.closed);
-	free(m.doubt.data);
-	geo_pair_table_free(&m.table);
-	occ_facet_set_free(&m.facets);
-	occ_occluder_set_free(&m.bodies);
+	matrix_free(&m);
 	return bad ? -1 : 0;
 }

@@ -157,11 +157,30 @@ static double inwards(const struct model *m, const uint32_t *corner, const uint3
 	return towards_middle;
 }
 
+/* Adds what the solution says of a corner's side, and of its light from the corner to the
+ * middle, weighed by the area of its element. */
+static void add_corner(const struct gather *g, uint32_t corner, int side, double step,
+                       struct corner_point *p)
+{
+	const float *all = g->v->all.corner, *indirect = g->table.indirect.corner;
+	size_t bands = (size_t)g->v->m->bands, e = corner / 3;
+	double a = g->v->m->element.area[e];
+
+	for (size_t b = 0; b < bands; b++) {
+		size_t at = (2 * (size_t)corner + (size_t)side) * bands + b, mean[3];
+		for (size_t k = 0; k < 3; k++)
+			mean[k] = (2 * (3 * e + k) + (size_t)side) * bands + b;
+		p->h[b] += a * (double)all[at];
+		p->shift[b] += a * step *
+		               (double)(indirect[at] -
+		                        (indirect[mean[0]] + indirect[mean[1]] + indirect[mean[2]]) / 3);
+	}
+}
+
 static void find_point(const struct gather *g, const uint32_t *corner, const uint32_t *of, uint32_t n,
                        uint32_t cluster, int side, struct corner_point *p)
 {
 	const struct model *m = g->v->m;
-	const struct reconstruction *all = &g->v->all, *indirect = &g->table.indirect;
 	const double *vertex = &m->vertex[3 * (size_t)m->element.corner[corner[0]]];
 	double middle[3] = { 0 }, c[3], area = 0, step = inwards(m, corner, of, n, cluster);
 	size_t bands = (size_t)m->bands;
@@ -177,16 +196,7 @@ static void find_point(const struct gather *g, const uint32_t *corner, const uin
 		v3_mad(middle, a, c, middle);
 		v3_mad(p->n, side ? -a : a, &m->element.normal[3 * (size_t)e], p->n);
 		area += a;
-		for (size_t b = 0; b < bands; b++) {
-			size_t at = (2 * (size_t)corner[i] + (size_t)side) * bands + b, mean[3];
-			for (size_t k = 0; k < 3; k++)
-				mean[k] = (2 * (3 * (size_t)e + k) + (size_t)side) * bands + b;
-			p->h[b] += a * (double)all->corner[at];
-			p->shift[b] += a * step *
-			               (double)(indirect->corner[at] -
-			                        (indirect->corner[mean[0]] + indirect->corner[mean[1]] +
-			                         indirect->corner[mean[2]]) / 3);
-		}
+		add_corner(g, corner[i], side, step, p);
 	}
 	for (size_t b = 0; b < bands; b++) {
 		p->h[b] /= area;

@@ -197,13 +197,32 @@ static void put_light(struct run *r, int parts, double n, const double *lit)
 	view_shade_tile_put_lobe(r->w->shader, &q);
 }
 
+/* Follows as many samples as are asked for; returns their number and in how many parts. */
+static uint32_t follow_all(struct run *r, int *parts)
+{
+	const struct view_branch *b = r->b;
+	uint32_t n = r->w->o->lobe_samples == VIEW_LOBE_ENOUGH ? PARTS * MOST : fixed_number(r);
+
+	r->next->share = b->share / n;
+	*parts = PARTS;
+	if (r->w->o->lobe_samples == VIEW_LOBE_ENOUGH) {
+		r->first = b->index * n;
+		return follow_until(r);
+	}
+	*parts = n < PARTS ? (int)n : PARTS;
+	r->first = b->index * (uint32_t)r->w->o->lobe_samples;
+	for (uint32_t i = 0; i < n; i++)
+		follow_both(r, i, &r->part[i * (uint32_t)*parts / n]);
+	return n;
+}
+
 void view_lobe_follow(struct view_walker *w, const struct view_branch *b,
                       const struct view_lobe_seen *l, const double *coefficient,
                       struct view_branch *next)
 {
 	struct run r = { .w = w, .b = b, .l = l, .coefficient = coefficient, .next = next };
 	double directional[BANDS_MAX], cut[BANDS_MAX], lit[BANDS_MAX] = { 0 };
-	int parts = PARTS;
+	int parts;
 
 	next->lobes = 1;
 	if (b->lobes) {
@@ -218,17 +237,7 @@ void view_lobe_follow(struct view_walker *w, const struct view_branch *b,
 	next->straight = 1;
 	next->turns = 0;
 	aim(w, b, l, coefficient);
-	uint32_t n = w->o->lobe_samples == VIEW_LOBE_ENOUGH ? PARTS * MOST : fixed_number(&r);
-	next->share = b->share / n;
-	if (w->o->lobe_samples == VIEW_LOBE_ENOUGH) {
-		r.first = b->index * n;
-		n = follow_until(&r);
-	} else {
-		parts = n < PARTS ? (int)n : PARTS;
-		r.first = b->index * (uint32_t)w->o->lobe_samples;
-		for (uint32_t i = 0; i < n; i++)
-			follow_both(&r, i, &r.part[i * (uint32_t)parts / n]);
-	}
+	uint32_t n = follow_all(&r, &parts);
 	for (int k = 0; k < w->v->m->bands; k++) {
 		w->directional[k] = directional[k];
 		for (int p = 0; p < parts; p++) {
