@@ -27,7 +27,7 @@ OPT ?= -O2 -march=x86-64-v3
 SANFLAGS := $(if $(SAN),-fsanitize=address$(,)undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
 WARN := -Wall -Wextra -Wpedantic -Wshadow -Wconversion
 EXR_CFLAGS := $(shell pkg-config --cflags OpenEXR 2>/dev/null)
-CPPFLAGS += -I. -D_POSIX_C_SOURCE=200809L -D_FILE_OFFSET_BITS=64 -MMD -MP $(EXR_CFLAGS)
+CPPFLAGS += -I. -D_POSIX_C_SOURCE=200809L -D_FILE_OFFSET_BITS=64 -DTWOPASS_VERSION='"$(VERSION)"' -MMD -MP $(EXR_CFLAGS)
 CFLAGS += -std=c11 $(OPT) -g -pthread -ffp-contract=off $(WARN) $(SANFLAGS)
 CXXFLAGS += -std=c++17 $(OPT) -g -pthread $(WARN) $(SANFLAGS)
 LDFLAGS += -pthread $(SANFLAGS)
@@ -141,20 +141,51 @@ format:
 
 # ---- installation ----
 
-install: all
-	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib \
-		$(DESTDIR)$(PREFIX)/share/twopass $(DESTDIR)$(PREFIX)/share/man/man1 \
-		$(DESTDIR)$(PREFIX)/share/man/man5 $(DESTDIR)$(PREFIX)/share/man/man7
-	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
-	install -m 644 $(BUILD)/libcommon.a $(DESTDIR)$(PREFIX)/lib
-	for h in lib/*/*.h formats/*/*.h; do install -D -m 644 $$h $(DESTDIR)$(PREFIX)/include/twopass/$$h; done
-	install -m 644 tools/pipeline.mk $(DESTDIR)$(PREFIX)/share/twopass
-	for s in 1 5 7; do install -m 644 man/*.$$s $(DESTDIR)$(PREFIX)/share/man/man$$s; done
+DEST = $(DESTDIR)$(PREFIX)
+
+# The library as it is installed: one object that shows twopass_* to linkers and nothing
+# else, so that no name of ours meets one of a user's program. COMDAT groups are dissolved
+# first, or a program's inline function of the same name would take their place.
+API_OBJS := $(patsubst %.c,$(BUILD)/%.o,$(wildcard formats/api/*.c))
+$(BUILD)/install/libcommon.a: $(API_OBJS) $(BUILD)/libcommon.a
+	@mkdir -p $(@D)
+	ld -r --force-group-allocation -o $(@D)/twopass.o $^
+	objcopy --wildcard --keep-global-symbol='twopass_*' $(@D)/twopass.o
+	@rm -f $@
+	ar rcs $@ $(@D)/twopass.o
+
+define LIBCOMMON_PC
+prefix=$(PREFIX)
+includedir=$${prefix}/include
+libdir=$${prefix}/lib
+
+Name: libcommon
+Description: global illumination, form factors and pictures of a scene (twopass)
+Version: $(VERSION)
+Cflags: -I$${includedir}
+Libs: -L$${libdir} -lcommon $(LDLIBS) -pthread $(SANFLAGS)
+endef
+export LIBCOMMON_PC
+
+install: all $(BUILD)/install/libcommon.a
+	install -d $(DEST)/bin $(DEST)/include $(DEST)/lib/pkgconfig $(DEST)/share/twopass
+	install -m 755 $(PROGRAMS) $(DEST)/bin
+	install -m 644 formats/api/twopass.h $(DEST)/include
+	install -m 644 $(BUILD)/install/libcommon.a $(DEST)/lib
+	echo "$$LIBCOMMON_PC" >$(DEST)/lib/pkgconfig/libcommon.pc
+	install -m 644 tools/pipeline.mk $(DEST)/share/twopass
+	for p in man/*.[1-9]; do install -D -m 644 -t $(DEST)/share/man/man$${p##*.} $$p; done
+
+uninstall:
+	rm -f $(TOOLS:%=$(DEST)/bin/%) $(DEST)/include/twopass.h $(DEST)/lib/libcommon.a \
+		$(DEST)/lib/pkgconfig/libcommon.pc $(DEST)/share/twopass/pipeline.mk
+	for p in $(notdir $(wildcard man/*.[1-9])); do rm -f $(DEST)/share/man/man$${p##*.}/$$p; done
+	[ ! -d $(DEST)/share/twopass ] || rmdir $(DEST)/share/twopass
 
 clean:
 	rm -rf build build-san out
 
 .PHONY: all unit deps demo check check-layers check-man oracles bench report report-long bench-form-factors \
-	format install clean
+	format install uninstall clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

@@ -22,6 +22,8 @@ LAYERS = {
     "formats/cache": "base data formats/container",
     "formats/picture": "base picture formats/container",
     "formats/gltf": "base data scatter formats/container",
+    "formats/api": "base data scatter geometry mesh ff radiosity interpolate audit ray picture view "
+                   "formats/container formats/cache formats/gltf",
 }
 FILES = r"\b(fopen|fread|fwrite|printf|fprintf|exit|abort)\("
 PHYSICS = r"\b(cos|sin|tan|acos|asin|atan2?)\b *\(|3\.14159"

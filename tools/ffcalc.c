@@ -15,7 +15,6 @@
 
 enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GAIN, OPT_GATHER,
        OPT_TO, OPT_CLOSE, OPT_LOBE_DEPTH, OPT_LINKS };
-enum { GATHER_LEAST = 16 };
 
 static const struct cli_option options[] = {
 	{ 'o', "output", "FILE", "write the form factors to FILE (.ff)" },
@@ -75,22 +74,21 @@ static enum ff_method parse_method(const struct cli *c, const char *text)
 static void parse(struct cli *c, int argc, char **argv, struct request *r)
 {
 	int letter;
-	long n = 0, gather = -1;
 	struct ff_options *o = &r->ff;
+	struct err wrong = { 0 };
 
-	*o = (struct ff_options){ .points = 16, .emitter_gain = 8, .lobe_rays = 4096, .lobe_depth = 4, .depth = 256,
-	                          .seed = 1, .method = FF_AUTO, .evaluations = 50000, .shard = 1, .shards = 1 };
+	*o = FF_OPTIONS_DEFAULT;
 	while ((letter = cli_next(c, argc, argv)) != -1) {
 		switch (letter) {
 		case 'o': r->output = optarg; break;
 		case 'm': o->method = parse_method(c, optarg); break;
 		case 't': o->target = cli_number(c, "--target", optarg, 1e-12, 1); break;
 		case OPT_TO: parse_word(c, "--to", optarg, "patches", "elements", &o->to_patches); break;
-		case 'n': n = cli_integer(c, "--samples", optarg, 4, 1 << 26); break;
+		case 'n': o->rays = (uint32_t)cli_integer(c, "--samples", optarg, 4, 1 << 26); break;
 		case 'p': o->points = (uint32_t)cli_integer(c, "--points", optarg, 1, 4096); break;
 		case OPT_CLOSE: o->close = 1; break;
 		case OPT_GAIN: o->emitter_gain = (uint32_t)cli_integer(c, "--emitter-gain", optarg, 1, 4096); break;
-		case OPT_GATHER: gather = cli_integer(c, "--gather", optarg, 0, 1 << 20); break;
+		case OPT_GATHER: o->gather = (uint32_t)cli_integer(c, "--gather", optarg, 0, 1 << 20); break;
 		case OPT_LOBE_RAYS: o->lobe_rays = (uint32_t)cli_integer(c, "--lobe-rays", optarg, 1, 1 << 26); break;
 		case OPT_LINKS: parse_word(c, "--links", optarg, "centroid", "rays", &o->centroid); break;
 		case OPT_LOBE_DEPTH: o->lobe_depth = (uint32_t)cli_integer(c, "--lobe-depth", optarg, 0, 64); break;
@@ -106,23 +104,9 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 		cli_usage(c, "an output is needed: -o FILE.ff");
 	r->mesh = argv[optind];
 	cli_keep_input(c, r->output, r->mesh);
-	int hemicube = o->method == FF_HEMICUBE;
-	o->rays = n ? (uint32_t)n : hemicube ? 64 : 4096;
-	if (hemicube && (o->rays % 2 || o->rays > 8192))
-		cli_usage(c, "--samples %u: a hemicube's resolution is even and at most 8192", o->rays);
-	if (!hemicube) {
-		uint32_t least = o->method == FF_RAYS ? 0 : GATHER_LEAST;
-		o->rays = (o->rays + 3) / 4 * 4;
-		o->gather = gather >= 0 ? (uint32_t)gather
-		          : o->rays / 16 >= GATHER_LEAST ? o->rays / 16 : least;
-	}
-	if (o->method == FF_ANALYTIC && o->gather == 0)
-		cli_usage(c, "--gather 0: the formulas of -m analytic need rays of the elements");
-	if (o->centroid)
-		o->lobe_depth = 0;
-	if (o->target == 0)
-		o->target = o->to_patches ? 1e-6 : 1e-4;
 	o->threads = c->threads;
+	if (ff_options_complete(o, &wrong))
+		cli_usage(c, "%s", wrong.text);
 }
 
 static json_t *options_json(const struct ff_options *o)
@@ -169,7 +153,7 @@ static void make_key(const struct cache_info *mesh, const char *chosen, char key
 {
 	struct digest *d = file_digest_new();
 
-	file_digest_string(d, "ffcalc " TWOPASS_VERSION " " REVISION_FF);
+	digest_string(d, "ffcalc " TWOPASS_VERSION " " REVISION_FF);
 	file_digest_string(d, mesh->geometry_id);
 	file_digest_string(d, chosen);
 	file_digest_end(d, key);

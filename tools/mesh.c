@@ -91,8 +91,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 	int letter, refines = 0;
 
 	r->refine = (struct mesh_refinement){ .02, { .0025, 1 }, 1000000 };
-	r->mesher = (struct mesh_options){ .patch = { .05, 1 }, .element = { .04, 1 },
-		                             .element_within_patch = 1, .normal_cone = 20 };
+	r->mesher = MESHER_OPTIONS_DEFAULT;
 	r->gltf = GLTF_OPTIONS_DEFAULT;
 	while ((letter = cli_next(c, argc, argv)) != -1) {
 		switch (letter) {
@@ -289,7 +288,7 @@ static char *make_key(const struct job *j)
 	char hex[33];
 	struct digest *d = file_digest_new();
 
-	file_digest_string(d, "mesh " TWOPASS_VERSION " " CACHE_VERSION " " REVISION_MESH);
+	digest_string(d, "mesh " TWOPASS_VERSION " " CACHE_VERSION " " REVISION_MESH);
 	file_digest_string(d, j->info.options);
 	file_digest_string(d, j->gltf.digest);
 	if (j->r->solution)

@@ -60,7 +60,7 @@ static void parse(struct cli *c, int argc, char **argv, struct request *r)
 {
 	int letter;
 
-	r->solve = (struct radiosity_options){ .stop = 1e-4, .max_shots = UINT64_MAX };
+	r->solve = RADIOSITY_OPTIONS_DEFAULT;
 	while ((letter = cli_next(c, argc, argv)) != -1) {
 		switch (letter) {
 		case 'o': r->output = optarg; break;
@@ -127,7 +127,7 @@ static void make_key(const struct job *j, char key[33])
 	struct digest *d = file_digest_new();
 	const struct model *m = &j->m;
 
-	file_digest_string(d, "shoot " TWOPASS_VERSION " " REVISION_RAD);
+	digest_string(d, "shoot " TWOPASS_VERSION " " REVISION_RAD);
 	file_digest_string(d, j->mesh.geometry_id);
 	file_digest_string(d, j->mesh.material_id);
 	for (size_t i = 0; i < m->surface.n; i++)

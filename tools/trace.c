@@ -24,8 +24,8 @@ enum { OPT_EYE = 256, OPT_TARGET, OPT_UP, OPT_FOV, OPT_SAMPLES, OPT_LOBE_SAMPLES
        OPT_CUTOFF, OPT_HALF, OPT_COMPRESSION, OPT_LAYERS, OPT_MIX, OPT_GATHER_RAYS,
        OPT_BUDGET };
 
-/* Where they are not given; samples at most where an error is aimed at. */
-enum { SAMPLES = 4, TARGET_SAMPLES = 64, GATHER_RAYS = 1024 };
+/* At most, where an error is aimed at. */
+enum { TARGET_SAMPLES = 64 };
 
 static const struct cli_option option_table[] = {
 	{ 'c', "camera", "NAME", "camera to render; repeatable, or 'all'" },
@@ -211,9 +211,10 @@ static void parse(struct trace *t, int argc, char **argv)
 	if (t->budget > 0 && (t->view.relative > 0 || t->view.samples || t->view.gather_rays))
 		cli_usage(c, "--budget goes without -t, --samples and --gather-rays, which it chooses");
 	if (!t->view.samples)
-		t->view.samples = t->view.relative > 0 ? TARGET_SAMPLES : SAMPLES;
+		t->view.samples = t->view.relative > 0 ? TARGET_SAMPLES
+		                                        : VIEW_OPTIONS_DEFAULT.samples;
 	if (!t->view.gather_rays)
-		t->view.gather_rays = GATHER_RAYS;
+		t->view.gather_rays = VIEW_OPTIONS_DEFAULT.gather_rays;
 	t->view.threads = t->cli.threads;
 	t->results = strcmp(t->output, "-") == 0 ? stderr : stdout;
 }
@@ -223,7 +224,7 @@ static void parse(struct trace *t, int argc, char **argv)
 static int ad_hoc_camera(struct trace *t, struct err *e)
 {
 	static const double y[3] = { 0, 1, 0 }, minus_z[3] = { 0, 0, -1 };
-	double fov = t->fov > 0 ? t->fov : 50;
+	double fov = t->fov > 0 ? t->fov : CAMERA_FOV;
 	struct err steep = { 0 };
 
 	if (t->has_up) {
@@ -248,7 +249,7 @@ static void picture_key(const struct trace *t, struct shot *s)
 	struct digest *d = file_digest_new();
 
 	file_cache_camera_id(s->camera, camera);
-	file_digest_string(d, "twopass.exr " TWOPASS_VERSION " " REVISION_VIEW);
+	digest_string(d, "twopass.exr " TWOPASS_VERSION " " REVISION_VIEW);
 	file_digest_string(d, t->content);
 	file_digest_string(d, camera);
 	file_digest_bytes(d, number, sizeof number);
@@ -427,7 +428,7 @@ static int render_within(const struct trace *t, const struct shot *s, const stru
 		picture_image_free(im);
 		*im = (struct image){ 0 };
 		o.samples = 1 << level;
-		o.gather_rays = GATHER_RAYS / 8 << level;
+		o.gather_rays = VIEW_OPTIONS_DEFAULT.gather_rays / 8 << level;
 		bad = view_render(t->scene, &s->frame, &o, progress, im, v, e);
 		double now = cli_seconds(), left = t->budget - (now - begun);
 		double more = now > last ? .9 * left / (now - last) : 0;
@@ -517,11 +518,12 @@ int main(int argc, char **argv)
 		         .about = "Render views of a solved scene, following mirrors, panes and lobes.",
 		         .options = option_table, .uses_threads = 1 },
 		.method = VIEW_DIRECT,
-		.view = { .depth = 32, .cutoff = 1e-3, .lobe_samples = VIEW_LOBE_ENOUGH }
+		.view = VIEW_OPTIONS_DEFAULT
 	};
 	struct err e = { 0 };
 	int status = 0;
 
+	t.view.samples = t.view.gather_rays = 0; /* not given */
 	cli_signals();
 	t.camera = mem_new((size_t)argc, sizeof *t.camera, "camera names", &e);
 	if (!t.camera)

@@ -29,6 +29,19 @@ struct ff_options {
 	int threads;
 };
 
+/* What is left to ff_options_complete: the number of rays and the target are 0, gather
+ * this. */
+#define FF_GATHER_UNSET UINT32_MAX
+
+#define FF_OPTIONS_DEFAULT \
+	((struct ff_options){ .method = FF_AUTO, .points = 16, .emitter_gain = 8, \
+	                      .gather = FF_GATHER_UNSET, .lobe_rays = 4096, .lobe_depth = 4, \
+	                      .depth = 256, .seed = 1, .evaluations = 50000, .shard = 1, .shards = 1 })
+
+/* Fills in what is unset and depends on other options, and makes the number of rays one
+ * that the method can use. 0, or -1 and e if options contradict one another. */
+int ff_options_complete(struct ff_options *o, struct err *e);
+
 struct ff_stats {
 	double rays;          /* traced, all kinds */
 	double samples;       /* rays or pixels spent on diffuse rows */

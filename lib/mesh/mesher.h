@@ -28,6 +28,10 @@ struct mesh_options {
 	const struct progress *progress; /* or NULL */
 };
 
+#define MESHER_OPTIONS_DEFAULT \
+	((struct mesher_options){ .patch = { .05, 1 }, .element = { .04, 1 }, \
+	                          .element_within_patch = 1, .normal_cone = 20 })
+
 /* Refinement goes on until the expected error is small enough, or the elements are so many
  * or so small; in one step to a quarter of an element's edge at most. */
 struct mesh_refinement {

@@ -7,6 +7,9 @@
 
 enum { CAMERA_WIDTH = 640, CAMERA_SIZE_MAX = 65536 };
 
+/* Vertical field of view, degrees, of a view that gives none. */
+#define CAMERA_FOV 50.
+
 /* Width over height of a camera that gives none. */
 #define CAMERA_ASPECT (4. / 3)
 

@@ -24,6 +24,9 @@ struct radiosity_options {
 	int threads;
 };
 
+#define RADIOSITY_OPTIONS_DEFAULT \
+	((struct radiosity_options){ .stop = 1e-4, .max_shots = UINT64_MAX })
+
 struct radiosity_step {    /* after each round */
 	uint64_t round, shots;
 	int bands;

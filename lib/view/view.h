@@ -49,6 +49,10 @@ struct view_options {
 	int threads;
 };
 
+#define VIEW_OPTIONS_DEFAULT \
+	((struct view_options){ .samples = 4, .lobe_samples = VIEW_LOBE_ENOUGH, .depth = 32, \
+	                        .cutoff = 1e-3, .gather_rays = 1024 })
+
 struct view_stats {
 	uint64_t rays;
 	double radiance;   /* mean over pixels, summed over bands */

@@ -5,8 +5,6 @@
 #include "lib/base/err.h"
 #include "lib/base/parallel.h"
 
-#define TWOPASS_VERSION "0.1.0"
-
 /* An option; the last entry has letter 0. Options without a short form use
  * letters >= 256. --help prints the table; --help, --version, -q, -v and (where
  * `threads` is set) -j are handled by cli_next. */
