@@ -147,7 +147,7 @@ DEST = $(DESTDIR)$(PREFIX)
 # else, so that no name of ours meets one of a user's program. COMDAT groups are dissolved
 # first, or a program's inline function of the same name would take their place.
 API_OBJS := $(patsubst %.c,$(BUILD)/%.o,$(wildcard formats/api/*.c))
-$(BUILD)/install/libcommon.a: $(API_OBJS) $(BUILD)/libcommon.a
+$(BUILD)/dist/libcommon.a: $(API_OBJS) $(BUILD)/libcommon.a
 	@mkdir -p $(@D)
 	ld -r --force-group-allocation -o $(@D)/twopass.o $^
 	objcopy --wildcard --keep-global-symbol='twopass_*' $(@D)/twopass.o
@@ -167,11 +167,11 @@ Libs: -L$${libdir} -lcommon $(LDLIBS) -pthread $(SANFLAGS)
 endef
 export LIBCOMMON_PC
 
-install: all $(BUILD)/install/libcommon.a
+install: all $(BUILD)/dist/libcommon.a
 	install -d $(DEST)/bin $(DEST)/include $(DEST)/lib/pkgconfig $(DEST)/share/twopass
 	install -m 755 $(PROGRAMS) $(DEST)/bin
 	install -m 644 formats/api/twopass.h $(DEST)/include
-	install -m 644 $(BUILD)/install/libcommon.a $(DEST)/lib
+	install -m 644 $(BUILD)/dist/libcommon.a $(DEST)/lib
 	echo "$$LIBCOMMON_PC" >$(DEST)/lib/pkgconfig/libcommon.pc
 	install -m 644 tools/pipeline.mk $(DEST)/share/twopass
 	for p in man/*.[1-9]; do install -D -m 644 -t $(DEST)/share/man/man$${p##*.} $$p; done

@@ -84,8 +84,9 @@ static int render(const struct twopass_scene *s, const struct twopass_view *v, f
 int twopass_render(const struct twopass_scene *s, const struct twopass_view *view, float *rgb,
                    double *relative_error, struct twopass_error *error)
 {
+	const struct twopass_view usual = twopass_view_defaults();
 	struct err e = { 0 };
 
-	(void)render(s, view, rgb, relative_error, &e);
+	(void)render(s, view ? view : &usual, rgb, relative_error, &e);
 	return api_status(&e, error);
 }
