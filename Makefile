@@ -180,7 +180,7 @@ uninstall:
 	rm -f $(TOOLS:%=$(DEST)/bin/%) $(DEST)/include/twopass.h $(DEST)/lib/libcommon.a \
 		$(DEST)/lib/pkgconfig/libcommon.pc $(DEST)/share/twopass/pipeline.mk
 	for p in $(notdir $(wildcard man/*.[1-9])); do rm -f $(DEST)/share/man/man$${p##*.}/$$p; done
-	[ ! -d $(DEST)/share/twopass ] || rmdir $(DEST)/share/twopass
+	[ ! -d $(DEST)/share/twopass ] || rmdir --ignore-fail-on-non-empty $(DEST)/share/twopass
 
 clean:
 	rm -rf build build-san out
