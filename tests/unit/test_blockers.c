@@ -1,25 +1,14 @@
 /* Bodies, sights and partly hidden polygons: against hand-made scenes and brute force. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "lib/occlusion/exchange.h"
 #include "lib/occlusion/facet_set.h"
 #include "lib/occlusion/occluder_set.h"
 #include "lib/occlusion/visible_region.h"
 #include "tests/unit/fixtures/brute.h"
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/random_scene.h"
-
-static void assert_near(double got, double expected, double tolerance)
-{
-	if (!(fabs(got - expected) <= tolerance))
-		fail_msg("got %.17g, expected %.17g within %.2g", got, expected, tolerance);
-}
 
 struct lab {
 	struct model m;
@@ -389,7 +378,7 @@ static void test_exchange(void **state)
 		double got = occ_exchange(&l.x, &l.s, a, &l.s, b, &off, &e);
 		brute_begin(&brute, &l.m, l.centre, &l.s.facet[a], &l.s.facet[b], l.bodies.near);
 		assert_near(got, brute_exchange(&brute, 1e-4, 3), 4e-6);
-		assert_true(off <= 1.2e-6);
+		assert_that(off, <=, 1.2e-6);
 		double back = occ_exchange(&l.x, &l.s, b, &l.s, a, &off, &e);
 		assert_near(back, got, 4e-6);
 		finish(&l);

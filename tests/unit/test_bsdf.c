@@ -1,17 +1,12 @@
 /* The scattering model: sampling against density, energy, sides, reciprocity. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
 #include "lib/scatter/bsdf.h"
 #include "lib/scatter/lobe.h"
+#include "tests/unit/fixtures/check.h"
 
 #define COUNT(a) (sizeof(a) / sizeof *(a))
 
@@ -120,7 +115,7 @@ static void expected_shares(const struct lobe_case *c, double *share)
 		share[BINS - 1] -= p;
 	}
 	if (c->m->lobe == LOBE_PAPER) { /* which loses nothing: the rest is rounding */
-		assert_true(fabs(share[BINS - 1]) < 2e-3);
+		assert_that(fabs(share[BINS - 1]), <, 2e-3);
 		share[BINS - 1] = 0;
 	}
 }
@@ -140,7 +135,7 @@ static void count_draws(const struct lobe_case *c, uint64_t seed, double *count)
 			continue;
 		}
 		assert_int_equal(s.event, c->transmitted ? BSDF_LOBE_T : BSDF_LOBE_R);
-		assert_true(v3_dot(c->side, s.w) > 0);
+		assert_that(v3_dot(c->side, s.w), >, 0);
 		count[find_bin(c, s.w)]++;
 	}
 }
@@ -162,7 +157,7 @@ static double chi_square(const double *share, const double *count, int bins, dou
 			sum += (o - e) * (o - e) / e;
 			freedom++;
 		} else {
-			assert_true(o <= 10);
+			assert_that(o, <=, 10);
 		}
 	}
 	double v = 2. / (9 * freedom);
@@ -198,7 +193,7 @@ static void test_chi_square_of_lobes(void **state)
 		model_materials_free(&m.material);
 	}
 	assert_int_equal(cases, 280);
-	assert_true(worst > 1.5); /* a statistic that never moves is no test */
+	assert_that(worst, >, 1.5); /* a statistic that never moves is no test */
 }
 
 /* ---- everything at once: diffuse, lobes, a pane, three bands, unlike sides ---- */
@@ -296,9 +291,9 @@ static void mixed_draws(const struct model *m, const double known[3],
 		if (s.pdf > 0) {
 			double p = bsdf_pdf(m, 0, n, known, transport, s.w);
 			bsdf_eval(m, 0, n, light ? known : s.w, light ? s.w : known, f);
-			assert_true(fabs(p - s.pdf) <= 1e-12 * p);
+			assert_near(p, s.pdf, 1e-12 * p);
 			for (int b = 0; b < 3; b++)
-				assert_true(fabs(f[b] * fabs(v3_dot(n, s.w)) - s.weight[b] * p) <=
+				assert_near(f[b] * fabs(v3_dot(n, s.w)), s.weight[b] * p,
 				            1e-12 * s.weight[b] * p);
 		}
 		for (int b = 0; b < 3; b++) {
@@ -338,7 +333,7 @@ static void check_mixed(const struct model *m, double degrees,
 	mixed_shares(m, known, transport, share);
 	delta_share(m, side, transport, share);
 	if (m->lobe == LOBE_PAPER) /* the density misses nothing but the deltas */
-		assert_true(fabs(share[SPHERE - 1]) < 2e-3);
+		assert_that(fabs(share[SPHERE - 1]), <, 2e-3);
 	share[SPHERE - 1] = m->lobe == LOBE_PAPER ? 0 : share[SPHERE - 1];
 	mixed_draws(m, known, transport, seed, &sums);
 	double z = chi_square(share, sums.count, SPHERE, MIXED_DRAWS);
@@ -356,7 +351,7 @@ static void check_mixed(const struct model *m, double degrees,
 			fail_msg("case %d: mean weight %g, albedo %g, allowed %g", (int)seed,
 			         sums.mean[b], albedo[b], allowed);
 		if (transport == BSDF_FROM_LIGHT && m->lobe == LOBE_PAPER)
-			assert_true(fabs(albedo[b] - bsdf_albedo(&m->material, 0, side, b)) < 2e-3);
+			assert_near(albedo[b], bsdf_albedo(&m->material, 0, side, b), 2e-3);
 	}
 }
 
@@ -407,7 +402,7 @@ static void test_reciprocity_ratio_table(void **state)
 			direction(degrees[j] * pi / 180, 4, b);
 			bsdf_eval(&m, 0, n, a, b, &ab);
 			bsdf_eval(&m, 0, n, b, a, &ba);
-			assert_true(fabs(ab / ba / table[i].ratio[j] - 1) < 1e-12);
+			assert_near(ab / ba / table[i].ratio[j], 1, 1e-12);
 		}
 	model_materials_free(&m.material);
 }
@@ -427,7 +422,7 @@ static void test_exponent_one_is_diffuse(void **state)
 		direction(0, 0, from);
 		direction(pi / 2 * rng_uniform(&r), 2 * pi * rng_uniform(&r), to);
 		bsdf_eval(&m, 0, n, from, to, &f);
-		assert_true(fabs(f * pi / .6 - 1) < 1e-12);
+		assert_near(f * pi / .6, 1, 1e-12);
 	}
 	model_materials_free(&m.material);
 }
@@ -449,7 +444,7 @@ static void test_reciprocal_lobe(void **state)
 		direction(pi * rng_uniform(&r), 2 * pi * rng_uniform(&r), b);
 		bsdf_eval(&m, 0, n, a, b, &ab);
 		bsdf_eval(&m, 0, n, b, a, &ba);
-		assert_true(fabs(ab - ba) <= 1e-12 * ab);
+		assert_near(ab, ba, 1e-12 * ab);
 	}
 	model_materials_free(&m.material);
 }
@@ -475,7 +470,7 @@ static void test_reciprocal_albedo(void **state)
 			mean += s.weight[0] / N;
 			square += s.weight[0] * s.weight[0] / N;
 		}
-		assert_true(fabs(mean - .8 * bsdf_lobe_albedo(20, cos(deg * pi / 180))) <
+		assert_near(mean, .8 * bsdf_lobe_albedo(20, cos(deg * pi / 180)),
 		            4 * sqrt((square - mean * mean) / N));
 	}
 	model_materials_free(&m.material);
@@ -535,10 +530,13 @@ static void test_one_sided(void **state)
 	bsdf_sample(&m, 0, n, behind, BSDF_FROM_LIGHT, u, &s);
 	assert_int_equal(s.event, BSDF_ABSORBED);
 	bsdf_eval(&m, 0, n, behind, front, f);
-	assert_true(f[0] == 0 && f[1] == 0 && f[2] == 0);
+	assert_that(f[0], ==, 0);
+	assert_that(f[1], ==, 0);
+	assert_that(f[2], ==, 0);
 	bsdf_emission(&m, 0, n, behind, f);
-	assert_true(f[0] == 0 && bsdf_exitance(&m.material, 0, BACK, 0) == 0);
-	assert_true(bsdf_albedo(&m.material, 0, BACK, 0) == 0);
+	assert_that(f[0], ==, 0);
+	assert_that(bsdf_exitance(&m.material, 0, BACK, 0), ==, 0);
+	assert_that(bsdf_albedo(&m.material, 0, BACK, 0), ==, 0);
 	assert_true(!bsdf_has_lobe(&m.material, 0, BACK, 0) && bsdf_has_lobe(&m.material, 0, FRONT, 0));
 	model_materials_free(&m.material);
 }
@@ -557,15 +555,22 @@ static void test_ideal(void **state)
 	assert_true(bsdf_has_ideal(&m.material, 0, FRONT, 0) && !bsdf_has_lobe(&m.material, 0, FRONT, 0));
 	assert_true(bsdf_has_ideal(&m.material, 0, BACK, 1) && !bsdf_has_ideal(&m.material, 0, FRONT, 1));
 	bsdf_sample(&m, 0, n, known, BSDF_FROM_EYE, u, &s);
-	assert_true(s.event == BSDF_IDEAL_R && s.pdf == 0 && fabs(s.weight[0] - .8) < 1e-15);
+	assert_that(s.event, ==, BSDF_IDEAL_R);
+	assert_that(s.pdf, ==, 0);
+	assert_near(s.weight[0], .8, 1e-15);
 	u[0] = .9;
 	bsdf_sample(&m, 0, n, known, BSDF_FROM_EYE, u, &s);
-	assert_true(s.event == BSDF_IDEAL_T && fabs(s.weight[0] - .8) < 1e-15);
-	assert_true(s.w[0] == -known[0] && s.w[1] == -known[1] && s.w[2] == -known[2]);
+	assert_that(s.event, ==, BSDF_IDEAL_T);
+	assert_near(s.weight[0], .8, 1e-15);
+	assert_that(s.w[0], ==, -known[0]);
+	assert_that(s.w[1], ==, -known[1]);
+	assert_that(s.w[2], ==, -known[2]);
 	bsdf_sample(&m, 0, n, known, BSDF_FROM_LIGHT, u, &s);
-	assert_true(s.event == BSDF_IDEAL_R && fabs(s.weight[0] - .6) < 1e-15);
+	assert_that(s.event, ==, BSDF_IDEAL_R);
+	assert_near(s.weight[0], .6, 1e-15);
 	bsdf_eval(&m, 0, n, known, s.w, &f);
-	assert_true(f == 0 && bsdf_pdf(&m, 0, n, known, BSDF_FROM_LIGHT, s.w) == 0);
+	assert_that(f, ==, 0);
+	assert_that(bsdf_pdf(&m, 0, n, known, BSDF_FROM_LIGHT, s.w), ==, 0);
 	model_materials_free(&m.material);
 }
 
@@ -580,7 +585,8 @@ static void check_grazing(const struct model *m, const double known[3], const do
 			double u[3], f[3];
 			draw_three(r, u);
 			bsdf_sample(m, 0, up, known, (enum bsdf_transport)t, u, &s);
-			assert_true(isfinite(s.pdf) && s.pdf >= 0);
+			assert_true(isfinite(s.pdf));
+			assert_that(s.pdf, >=, 0);
 			for (int b = 0; b < 3; b++)
 				assert_true(isfinite(s.weight[b]) && s.weight[b] >= 0);
 			bsdf_eval(m, 0, up, known, s.w, f);
@@ -629,13 +635,14 @@ static void test_emission(void **state)
 			double c = (i + .5) / 100000;
 			direction(pi - acos(c), 0, w);
 			bsdf_emission(&m, 0, n, w, &l);
-			assert_true(fabs(l - 3 * pow(c, e - 1)) < 1e-9);
+			assert_near(l, 3 * pow(c, e - 1), 1e-9);
 			flux += 2 * pi * l * c / 100000;
 		}
-		assert_true(fabs(flux / bsdf_exitance(&m.material, 0, BACK, 0) - 1) < 1e-6);
+		assert_near(flux / bsdf_exitance(&m.material, 0, BACK, 0), 1, 1e-6);
 		direction(.3, 0, w);
 		bsdf_emission(&m, 0, n, w, &l);
-		assert_true(l == 0 && bsdf_exitance(&m.material, 0, FRONT, 0) == 0);
+		assert_that(l, ==, 0);
+		assert_that(bsdf_exitance(&m.material, 0, FRONT, 0), ==, 0);
 	}
 	model_materials_free(&m.material);
 }

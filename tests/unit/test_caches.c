@@ -1,10 +1,4 @@
 /* .mesh, .ff and .rad files: round trips and refusals. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
 #include <fcntl.h>
 #include <stdio.h>
 #include <sys/stat.h>
@@ -14,6 +8,7 @@
 #include "formats/cache/mesh_file.h"
 #include "formats/cache/rad_file.h"
 #include "lib/data/model_check.h"
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/small_scene.h"
 
 static char directory[] = "/tmp/twopass-caches-XXXXXX";
@@ -148,7 +143,8 @@ static void check_model(const struct model *m)
 	assert_int_equal(m->cameras, 2);
 	assert_string_equal(m->camera[1].name, "far");
 	assert_int_equal(m->camera[1].orthographic, 1);
-	assert_true(m->camera[0].yfov == .7 && m->camera[0].to_world[14] == 5);
+	assert_that(m->camera[0].yfov, ==, .7);
+	assert_that(m->camera[0].to_world[14], ==, 5);
 }
 
 static void test_mesh(void **state)
@@ -210,7 +206,9 @@ static void test_ff(void **state)
 	const uint16_t column[] = { 1, 4, 4, 0, 3, 4 }; /* the fourth block is a span */
 	SAME(f.f.block.column, words, 5);
 	SAME(f.f.column16, column, 6);
-	assert_true(f.f.columns == 6 && !f.f.to_patches && !f.f.column);
+	assert_that(f.f.columns, ==, 6);
+	assert_true(!f.f.to_patches);
+	assert_true(!f.f.column);
 	assert_true(ff_has_spans(&f.f, 3) && !ff_has_spans(&f.f, 0));
 	SAME(f.f.value, ff.value, 7);
 	assert_null(f.f.value64);
@@ -235,9 +233,9 @@ static void expect_block(const struct ff *f, uint64_t block, const uint32_t *col
 
 	for (struct ff_cursor c = ff_begin(f, block); ff_next(&c, &s);)
 		for (uint32_t k = 0; k < s.count; k++, i++) {
-			assert_true(i < n);
+			assert_that(i, <, n);
 			assert_int_equal(s.column + 2 * k, column[i]);
-			assert_true(ff_value(f, s.entry + k) == (double)value[i]);
+			assert_that(ff_value(f, s.entry + k), ==, (double)value[i]);
 		}
 	assert_int_equal(i, n);
 }
@@ -461,7 +459,7 @@ static void forge(const char *path, const char *name, size_t at, const void *val
 		size_t size = v->count * file_dtype_size(v->type);
 		char *data = copy(v->data, size);
 		if (strcmp(v->name, name) == 0) {
-			assert_true(at + bytes <= size);
+			assert_that(at + bytes, <=, size);
 			memcpy(data + at, value, bytes);
 		}
 		must(file_container_put(w, v->name, v->type, v->dims, v->shape, data, &e), &e);

@@ -1,15 +1,10 @@
 /* Picture sizes, primary rays, depth and matrices of views. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "lib/base/vec3.h"
 #include "lib/picture/camera.h"
+#include "tests/unit/fixtures/check.h"
 
 static const double identity[16] = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 };
 
@@ -22,7 +17,7 @@ static struct camera perspective(double yfov, double aspect)
 
 static void near_vector(const double a[3], double x, double y, double z)
 {
-	assert_true(fabs(a[0] - x) + fabs(a[1] - y) + fabs(a[2] - z) < 1e-12);
+	assert_that(fabs(a[0] - x) + fabs(a[1] - y) + fabs(a[2] - z), <, 1e-12);
 }
 
 static void test_sizes(void **state)
@@ -50,7 +45,7 @@ static void test_resolution(void **state)
 	assert_int_equal(f.width, 640);
 	assert_int_equal(f.height, 320);
 	assert_int_equal(picture_camera_frame(&c, 100, 100, &f, &e), 0); /* the size wins */
-	assert_true(f.half_x == f.half_y);
+	assert_that(f.half_x, ==, f.half_y);
 	c.aspect = 0;
 	assert_int_equal(picture_camera_frame(&c, 0, 0, &f, &e), 0);
 	assert_int_equal(f.height, 480);
@@ -97,7 +92,7 @@ static void test_orthographic_rays(void **state)
 	near_vector(org, -2, 1, 5);
 	near_vector(dir, 0, 0, -1);
 	double p[3] = { 7, 8, 2 };
-	assert_true(fabs(picture_camera_depth(&f, p) - 3) < 1e-12);
+	assert_near(picture_camera_depth(&f, p), 3, 1e-12);
 }
 
 static void test_look_at(void **state)
@@ -122,7 +117,7 @@ static void test_look_at(void **state)
 	for (int j = 0; j < 3; j++)
 		for (int k = 0; k < 4; k++)
 			y[j] += x[k] * (double)w[4 * k + j];
-	assert_true(fabs(y[0] - 1) + fabs(y[1] - 4) + fabs(y[2] - 3) < 1e-6);
+	assert_that(fabs(y[0] - 1) + fabs(y[1] - 4) + fabs(y[2] - 3), <, 1e-6);
 	assert_int_equal(picture_camera_look_at(eye, eye, up, 90, &c, &e), -1);
 	assert_int_equal(picture_camera_look_at(eye, target, along, 90, &c, &e), -1);
 	assert_int_equal(picture_camera_look_at(eye, target, zero, 90, &c, &e), -1);

@@ -1,15 +1,10 @@
 /* Command lines, each run in a process of its own. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
 #include <fcntl.h>
 #include <sys/wait.h>
 
 /* The front end of the programs is not in the library. */
 #include "tools/common/cli.c"
+#include "tests/unit/fixtures/check.h"
 
 enum { OPT_SHARE = 256 };
 
@@ -68,7 +63,7 @@ static void run(int (*fn)(int argc, char **argv), const char *to, char **argv)
 		int status = fn(argc, argv);
 		_exit(status);
 	}
-	assert_true(pid > 0);
+	assert_that(pid, >, 0);
 	waitpid(pid, &child.status, 0);
 	read_back(to ? dup(err) : out, child.out);
 	read_back(err, child.err);
@@ -308,8 +303,9 @@ static void test_measures(void **state)
 	double begin = cli_seconds();
 
 	(void)state;
-	assert_true(cli_seconds() >= begin);
-	assert_true(cli_peak_megabytes() > .5 && cli_peak_megabytes() < 1e5);
+	assert_that(cli_seconds(), >=, begin);
+	assert_that(cli_peak_megabytes(), >, .5);
+	assert_that(cli_peak_megabytes(), <, 1e5);
 }
 
 int main(void)

@@ -1,14 +1,10 @@
 /* Closing rows by least squares, against a symmetric matrix that is known. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "lib/base/rng.h"
 #include "lib/ff/closure.h"
+#include "tests/unit/fixtures/check.h"
 
 enum { ROWS = 40, PAIRS = ROWS * (ROWS - 1) / 2 };
 
@@ -61,7 +57,7 @@ static void closes_and_improves(void **state)
 			missing[d[k].j] -= change[k];
 		}
 		for (int i = 0; i < ROWS; i++)
-			assert_true(fabs(missing[i]) < 1e-10);
+			assert_that(fabs(missing[i]), <, 1e-10);
 		assert_true(rms(wrong, change, n) < rms(wrong, NULL, n));
 	}
 }
@@ -76,9 +72,9 @@ static void open_rows(void **state)
 
 	(void)state;
 	assert_int_equal(ff_closure(d, 3, 4, missing, closed, change, &e), 0);
-	assert_true(fabs(change[0] + change[1] - 1e-3) < 1e-15);
-	assert_true(fabs(change[1]) < 1e-8);
-	assert_true(change[2] == 0);
+	assert_near(change[0] + change[1], 1e-3, 1e-15);
+	assert_that(fabs(change[1]), <, 1e-8);
+	assert_that(change[2], ==, 0);
 }
 
 static void nothing_in_doubt(void **state)

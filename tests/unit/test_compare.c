@@ -1,13 +1,8 @@
 /* Differences of pictures, against sums done by hand. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "lib/picture/compare.h"
+#include "tests/unit/fixtures/check.h"
 
 static const char *const names[] = { "R", "G", "B" };
 static const int rgb[3] = { 0, 1, 2 }, red[1] = { 0 };
@@ -28,12 +23,6 @@ static void compare(const struct image *a, const int *channel, const struct imag
 	assert_int_equal(picture_compare_channels(a, channel, b, channel, n, mask, d, &e), 0);
 }
 
-static void near(double got, double expected)
-{
-	if (!(fabs(got - expected) <= 1e-14 * fabs(expected)))
-		fail_msg("%.17g is not %.17g", got, expected);
-}
-
 static void test_equal(void **state)
 {
 	struct image a, b;
@@ -43,8 +32,13 @@ static void test_equal(void **state)
 	two_images(&a, &b);
 	compare(&a, rgb, &b, 3, NULL, &d);
 	assert_int_equal(d.pixels, 8);
-	assert_true(d.rmse == 0 && d.relative_rmse == 0 && d.bias == 0 && d.relative_bias == 0);
-	assert_true(d.max == 0 && d.max_x == 0 && d.max_y == 0);
+	assert_that(d.rmse, ==, 0);
+	assert_that(d.relative_rmse, ==, 0);
+	assert_that(d.bias, ==, 0);
+	assert_that(d.relative_bias, ==, 0);
+	assert_that(d.max, ==, 0);
+	assert_that(d.max_x, ==, 0);
+	assert_that(d.max_y, ==, 0);
 	picture_image_free(&a);
 	picture_image_free(&b);
 }
@@ -61,16 +55,16 @@ static void test_numbers(void **state)
 	for (int i = 0; i < 24; i++)
 		a.pixel[i] = i == 6 ? 5.f : i == 8 + 6 ? -2.f : 2.f;
 	compare(&a, red, &b, 1, NULL, &d);
-	near(d.mean_a, 19. / 8);
-	near(d.mean_b, 2);
-	near(d.bias, 3. / 8);
-	near(d.relative_bias, 3. / 16);
-	near(d.rmse, sqrt(9. / 8));
-	near(d.relative_rmse, sqrt(9. / 8) / 2);
+	assert_close(d.mean_a, 19. / 8, 1e-14);
+	assert_close(d.mean_b, 2, 1e-14);
+	assert_close(d.bias, 3. / 8, 1e-14);
+	assert_close(d.relative_bias, 3. / 16, 1e-14);
+	assert_close(d.rmse, sqrt(9. / 8), 1e-14);
+	assert_close(d.relative_rmse, sqrt(9. / 8) / 2, 1e-14);
 	compare(&a, rgb, &b, 3, NULL, &d);
-	near(d.rmse, sqrt(25. / 24));
-	near(d.bias, -1. / 24);
-	near(d.max, 4);
+	assert_close(d.rmse, sqrt(25. / 24), 1e-14);
+	assert_close(d.bias, -1. / 24, 1e-14);
+	assert_close(d.max, 4, 1e-14);
 	assert_int_equal(d.max_x, 2);
 	assert_int_equal(d.max_y, 1);
 	picture_image_free(&a);
@@ -96,7 +90,8 @@ static void test_not_finite(void **state)
 	compare(&a, rgb, &b, 3, NULL, &d);
 	assert_int_equal(d.pixels, 0);
 	assert_int_equal(d.left_out, 8);
-	assert_true(d.rmse == 0 && d.max_x == -1);
+	assert_that(d.rmse, ==, 0);
+	assert_that(d.max_x, ==, -1);
 	picture_image_free(&a);
 	picture_image_free(&b);
 }
@@ -110,8 +105,10 @@ static void test_black_yardstick(void **state)
 	two_images(&a, &b);
 	a.pixel[3] = -1;
 	compare(&a, rgb, &b, 3, NULL, &d);
-	assert_true(isinf(d.relative_rmse) && d.relative_rmse > 0);
-	assert_true(isinf(d.relative_bias) && d.relative_bias < 0);
+	assert_true(isinf(d.relative_rmse));
+	assert_that(d.relative_rmse, >, 0);
+	assert_true(isinf(d.relative_bias));
+	assert_that(d.relative_bias, <, 0);
 	picture_image_free(&a);
 	picture_image_free(&b);
 }
@@ -134,13 +131,14 @@ static void test_percentiles(void **state)
 	}
 	compare(&a, red, &b, 1, NULL, &d);
 	for (int i = 0; i < COMPARE_PERCENTILES; i++)
-		assert_true(fabs(d.percentile[i] - picture_compare_percentile[i] * 1e-3) < 1e-7);
+		assert_near(d.percentile[i], picture_compare_percentile[i] * 1e-3, 1e-7);
 	for (int i = 0; i < 100; i++)
 		mask[i] = 1 + (37 * i) % 100 > 10;
 	compare(&a, red, &b, 1, mask, &d);
 	assert_int_equal(d.pixels, 10);
 	assert_int_equal(d.excluded, 90);
-	assert_true(fabs(d.percentile[0] - .005) < 1e-7 && fabs(d.percentile[2] - .01) < 1e-7);
+	assert_near(d.percentile[0], .005, 1e-7);
+	assert_near(d.percentile[2], .01, 1e-7);
 	picture_image_free(&a);
 	picture_image_free(&b);
 }
@@ -158,7 +156,8 @@ static void test_colour_error(void **state)
 		a.pixel[i] = 3, a.pixel[8 + i] = .3f, a.pixel[16 + i] = 4.4f;
 	}
 	compare(&a, rgb, &b, 3, NULL, &d);
-	assert_true(fabs(d.percentile[0] - .1) < 1e-7 && fabs(d.percentile[2] - .1) < 1e-7);
+	assert_near(d.percentile[0], .1, 1e-7);
+	assert_near(d.percentile[2], .1, 1e-7);
 	picture_image_free(&a);
 	picture_image_free(&b);
 }
@@ -200,7 +199,8 @@ static void test_difference(void **state)
 	assert_int_equal(picture_compare_difference(&a, green, &b, green, 1, &c, &e), 0);
 	assert_int_equal(c.channels, 1);
 	assert_string_equal(c.name[0], "G");
-	assert_true(c.pixel[5] == -1.5f && c.pixel[4] == 0);
+	assert_that(c.pixel[5], ==, -1.5f);
+	assert_that(c.pixel[4], ==, 0);
 	picture_image_free(&a);
 	picture_image_free(&b);
 	picture_image_free(&c);
@@ -217,10 +217,13 @@ static void test_layers(void **state)
 	(void)state;
 	assert_int_equal(picture_image_new(&im, 1, 1, 8, many, &e), 0);
 	assert_int_equal(picture_image_layer(&im, "diffuse", c), 3);
-	assert_true(c[0] == 3 && c[1] == 2 && c[2] == 1);
+	assert_that(c[0], ==, 3);
+	assert_that(c[1], ==, 2);
+	assert_that(c[2], ==, 1);
 	assert_int_equal(picture_image_layer(&im, "N", c), 3);
 	assert_int_equal(picture_image_layer(&im, "Z", c), 1);
-	assert_true(c[0] == 0 && c[2] == 0);
+	assert_that(c[0], ==, 0);
+	assert_that(c[2], ==, 0);
 	assert_int_equal(picture_image_layer(&im, "half", c), 0);
 	assert_int_equal(picture_image_layer(&im, "half.R", c), 1);
 	assert_int_equal(picture_image_layer(&im, NULL, c), 0);

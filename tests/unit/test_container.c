@@ -1,10 +1,4 @@
 /* The safetensors container: round trips, atomicity, and refusals. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
@@ -20,6 +14,7 @@
 #include "formats/container/container.h"
 #include "formats/container/container_internal.h"
 #include "formats/container/history.h"
+#include "tests/unit/fixtures/check.h"
 
 static char directory[] = "/tmp/twopass-container-XXXXXX";
 static char path[64];
@@ -95,7 +90,7 @@ static void test_round_trip(void **state)
 	assert_int_equal((uintptr_t)v->data % 8, 0);
 	v = file_container_need(c, "rows", DT_F32, 2, any, &e);
 	assert_int_equal(v->shape[0], 5);
-	assert_true(((const float *)v->data)[8] == 4.f);
+	assert_that(((const float *)v->data)[8], ==, 4.f);
 	assert_memory_equal(file_container_find(c, "narrow")->data, bytes3, 3);
 	assert_int_equal(file_container_find(c, "empty")->count, 0);
 	assert_string_equal(file_container_at(c, 0)->name, "wide");
@@ -195,7 +190,7 @@ static void test_bad_declarations(void **state)
 
 	(void)state;
 	struct container_writer *w = file_container_create(path, &e);
-	assert_true(file_container_array(w, "x", DT_F64, 1, &n, &e) >= 0);
+	assert_that(file_container_array(w, "x", DT_F64, 1, &n, &e), >=, 0);
 	assert_int_equal(file_container_array(w, "x", DT_F64, 1, &n, &e), -1);
 	assert_non_null(strstr(e.text, "array x: declared twice"));
 	e.set = 0;
@@ -568,7 +563,7 @@ static void test_up_to_date(void **state)
 	assert_int_equal(st.st_mtime, 1000);
 	assert_int_equal(file_cache_up_to_date(path, "twopass.mesh", "k1"), 1);
 	assert_int_equal(stat(path, &st), 0);
-	assert_true(st.st_mtime > 1000);
+	assert_that(st.st_mtime, >, 1000);
 	assert_int_equal(truncate(path, st.st_size - 1), 0);
 	assert_int_equal(file_cache_up_to_date(path, "twopass.mesh", "k1"), 0);
 }

@@ -104,12 +104,6 @@ static double factor(double x0, double x1, double y0, double y1, double z)
 	       corner_factor(x0, y0, z);
 }
 
-static void near(double got, double expected, double relative)
-{
-	if (!(fabs(got - expected) <= relative * fabs(expected) + 1e-15))
-		fail_msg("%.17g is not %.17g", got, expected);
-}
-
 static void test_rectangle(void **state)
 {
 	struct stage t;
@@ -121,10 +115,10 @@ static void test_rectangle(void **state)
 	put(&t, 4, 1, -.5, -.3, 1.5, 1, .6);
 	stage_end(&t);
 	for (double x = -1.9; x < 2; x += .37) {
-		near(lit(&t, x, .3 * x, FRONT, &error),
+		assert_close(lit(&t, x, .3 * x, FRONT, &error),
 		     PI * factor(-.5 - x, .5 - x, -.3 - .3 * x, .3 - .3 * x, 1.5), 1e-12);
-		assert_true(error == 0);
-		assert_true(lit(&t, x, .3 * x, BACK, &error) == 0);
+		assert_that(error, ==, 0);
+		assert_that(lit(&t, x, .3 * x, BACK, &error), ==, 0);
 	}
 	stage_free(&t);
 }
@@ -144,8 +138,8 @@ static void test_hidden(void **state)
 	/* From (x, 0) the sheet's edge x = 0 is seen at -x on the lamp. */
 	for (double x = -1.4; x < 1.5; x += .1) {
 		double edge = fmin(1, fmax(-1, -x));
-		near(lit(&t, x, 0, FRONT, &error), PI * factor(-1 - x, edge - x, -1, 1, 1), 1e-9);
-		assert_true(error == 0);
+		assert_close(lit(&t, x, 0, FRONT, &error), PI * factor(-1 - x, edge - x, -1, 1, 1), 1e-9);
+		assert_that(error, ==, 0);
 	}
 	stage_free(&t);
 }
@@ -175,10 +169,11 @@ static void test_sampled(void **state)
 		/* Errors from four parts scatter: their root mean square is what counts. */
 		off += (got - sum) * (got - sum);
 		stated += error * error;
-		assert_true(error <= .01);
+		assert_that(error, <=, .01);
 	}
-	assert_true(off < 4 * stated && stated < 4 * off);
-	assert_true(occ_direct_rays(t.w) > 0);
+	assert_that(off, <, 4 * stated);
+	assert_that(stated, <, 4 * off);
+	assert_that(occ_direct_rays(t.w), >, 0);
 	stage_free(&t);
 }
 
@@ -206,7 +201,7 @@ static void test_exponent(void **state)
 				double clear = hidden && u > -x ? 0 : 1;
 				sum += clear * pow(c, 5) / r2 * 4. / (POINTS * POINTS);
 			}
-			near(lit(&t, x, 0, FRONT, &error), sum, hidden ? 5e-3 : 1e-4);
+			assert_close(lit(&t, x, 0, FRONT, &error), sum, hidden ? 5e-3 : 1e-4);
 		}
 		stage_free(&t);
 	}

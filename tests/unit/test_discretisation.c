@@ -128,7 +128,7 @@ static struct outcome run_noisy(field *f, double noise, double said)
 	for (size_t i = 0; i < m.element.n; i++) {
 		o.exact += m.element.area[i] * square(&m, &r, i, f);
 		o.stated += m.element.area[i] * s.error.discretisation[2 * i] * s.error.discretisation[2 * i];
-		assert_true(s.error.discretisation[2 * i + 1] == 0);
+		assert_that(s.error.discretisation[2 * i + 1], ==, 0);
 	}
 	o.noise = s.error.sampling[0];
 	o.exact = sqrt(o.exact);
@@ -147,13 +147,14 @@ static struct outcome run(field *f, double noise)
 static void test_exact_fields(void **state)
 {
 	(void)state;
-	assert_true(run(constant, 0).stated < 1e-12);
-	assert_true(run(linear, 0).stated < 1e-12);
+	assert_that(run(constant, 0).stated, <, 1e-12);
+	assert_that(run(linear, 0).stated, <, 1e-12);
 }
 
 static void within_factor(struct outcome o, double factor)
 {
-	assert_true(o.stated < o.exact * factor && o.exact < o.stated * factor);
+	assert_that(o.stated, <, o.exact * factor);
+	assert_that(o.exact, <, o.stated * factor);
 }
 
 static void test_smooth_fields(void **state)
@@ -174,7 +175,7 @@ static void test_shadow_edge(void **state)
 static void test_noise(void **state)
 {
 	(void)state;
-	assert_true(run(constant, .05).stated < .05);
+	assert_that(run(constant, .05).stated, <, .05);
 	within_factor(run(step, .05), 1.5);
 	within_factor(run(step, .01), 1.5);
 }
@@ -183,10 +184,10 @@ static void test_noise(void **state)
 static void test_stated_noise(void **state)
 {
 	(void)state;
-	assert_true(fabs(run_noisy(constant, .05, .15).noise / .05 - 1) < .2);
-	assert_true(fabs(run_noisy(step, .05, .15).noise / .05 - 1) < .35);
-	assert_true(fabs(run_noisy(linear, .05, .15).noise / .05 - 1) < .2);
-	assert_true(run_noisy(constant, .05, .02).noise == .02);
+	assert_near(run_noisy(constant, .05, .15).noise / .05, 1, .2);
+	assert_near(run_noisy(step, .05, .15).noise / .05, 1, .35);
+	assert_near(run_noisy(linear, .05, .15).noise / .05, 1, .2);
+	assert_that(run_noisy(constant, .05, .02).noise, ==, .02);
 	within_factor(run_noisy(step, .05, .15), 1.6);
 }
 
@@ -194,7 +195,7 @@ static void test_stated_noise(void **state)
 static void test_noise_by_patches(void **state)
 {
 	(void)state;
-	assert_true(run_noisy(constant, 0, .1).noise == .1);
+	assert_that(run_noisy(constant, 0, .1).noise, ==, .1);
 }
 
 int main(void)

@@ -1,10 +1,4 @@
 /* OpenEXR pictures: round trips, files of other writers, broken files. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
 #include <dirent.h>
 #include <math.h>
 #include <openexr.h>
@@ -17,6 +11,7 @@
 #include "formats/container/atomic_file.h"
 #include "formats/picture/exr_file.h"
 #include "lib/base/rng.h"
+#include "tests/unit/fixtures/check.h"
 
 static char directory[] = "/tmp/twopass-exr-XXXXXX";
 
@@ -53,10 +48,13 @@ static unsigned char *slurp(const char *path, size_t *size)
 	return bytes;
 }
 
+/* Into a new file: truncating one that has just been written waits for the disk. */
 static void spill(const char *path, const void *bytes, size_t size)
 {
-	FILE *f = fopen(path, "wb");
+	FILE *f;
 
+	unlink(path);
+	f = fopen(path, "wb");
 	assert_int_equal(fwrite(bytes, 1, size, f), size);
 	fclose(f);
 }
@@ -103,10 +101,10 @@ static void round_trip(int width, int height, enum exr_file_compression compress
 				assert_true(isnan(y[i]));
 			else if (as_half && isfinite(x[i]))
 				/* half an ulp of 11 bits, or of the denormals */
-				assert_true(fabsf(fminf(x[i], 65504) - y[i]) <=
+				assert_that(fabsf(fminf(x[i], 65504) - y[i]), <=,
 				            fmaxf(fabsf(x[i]) / 2048, 3e-8f));
 			else
-				assert_true(x[i] == y[i]);
+				assert_that(x[i], ==, y[i]);
 		}
 	}
 	picture_image_free(&a);
@@ -156,9 +154,9 @@ static void test_auto(void **state)
 	(void)state;
 	size_t zip = size_with_noise(0, EXR_FILE_ZIP), half = size_with_noise(256, EXR_FILE_ZIP);
 
-	assert_true(size_with_noise(0, EXR_FILE_AUTO) > zip * 101 / 100);
-	assert_true(half < zip * 6 / 10);
-	assert_true(size_with_noise(256, EXR_FILE_AUTO) < half * 108 / 100);
+	assert_that(size_with_noise(0, EXR_FILE_AUTO), >, zip * 101 / 100);
+	assert_that(half, <, zip * 6 / 10);
+	assert_that(size_with_noise(256, EXR_FILE_AUTO), <, half * 108 / 100);
 	assert_int_equal(size_with_noise(512, EXR_FILE_AUTO), size_with_noise(512, EXR_FILE_ZIP));
 }
 
@@ -192,7 +190,8 @@ static void test_attributes(void **state)
 	assert_string_equal(file_exr_info_get(&j, "history"), "mesh a\nffcalc b\n");
 	assert_string_equal(file_exr_info_get(&j, "twopassAnAttributeWithAVeryLongName"), "");
 	assert_null(file_exr_info_get(&j, "missing"));
-	assert_true(j.white_luminance == 1 && j.has_world_to_camera);
+	assert_that(j.white_luminance, ==, 1);
+	assert_true(j.has_world_to_camera);
 	assert_memory_equal(j.world_to_camera, i.world_to_camera, sizeof i.world_to_camera);
 	file_exr_info_free(&i);
 	file_exr_info_free(&j);
@@ -358,7 +357,7 @@ static void test_foreign(void **state)
 		assert_int_equal(im.height, file[i].height);
 		for (int y = 0; y < im.height; y++)
 			for (int x = 0; x < im.width; x++)
-				assert_true(im.pixel[y * im.width + x] == (float)(1000 * y + x));
+				assert_that(im.pixel[y * im.width + x], ==, (float)(1000 * y + x));
 		picture_image_free(&im);
 	}
 }
@@ -374,7 +373,7 @@ static void refuse(const char *path, const char *why)
 	assert_null(info.string);
 	if (!strstr(e.text, why))
 		fail_msg("'%s' does not say '%s'", e.text, why);
-	assert_true(strncmp(e.text, path, strlen(path)) == 0);
+	assert_that(strncmp(e.text, path, strlen(path)), ==, 0);
 	assert_null(strchr(e.text, '\n'));
 }
 
@@ -466,7 +465,7 @@ static void test_flipped(void **state)
 {
 	(void)state;
 	for (int c = EXR_FILE_ZIP; c <= EXR_FILE_NONE; c++)
-		assert_true(flip_all((enum exr_file_compression)c) > 100);
+		assert_that(flip_all((enum exr_file_compression)c), >, 100);
 }
 
 static void test_huge_window(void **state)

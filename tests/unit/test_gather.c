@@ -1,16 +1,11 @@
 /* Rows of rays, of what elements gather and of what they see of emitters, element by
  * element against Lambert's formula for polygons. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "lib/ff/ff_job.h"
 #include "lib/ff/ray_budget.h"
 #include "lib/ff/row_reciprocal.h"
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/memory_ff.h"
 #include "tests/unit/fixtures/shapes.h"
 
@@ -98,8 +93,9 @@ static void check_closure(const struct ff *f)
 		double sum = f->block.escape[b] + f->block.black[b] + f->block.lost[b] + f->block.cut[b];
 		for (uint64_t i = f->block.start[b]; i < f->block.start[b + 1]; i++)
 			sum += ff_value(f, i);
-		assert_true(fabs(sum * f->row.scale[r] - 1) <= 1e-12);
-		assert_true(f->row.error[r] >= 0 && f->row.error[r] < .1);
+		assert_near(sum * f->row.scale[r], 1, 1e-12);
+		assert_that(f->row.error[r], >=, 0);
+		assert_that(f->row.error[r], <, .1);
 	}
 }
 
@@ -120,14 +116,14 @@ static double floor_error(const struct model *m, const struct ff_options *o)
 		const double *n = &m->element.normal[3 * (size_t)el];
 		if (m->patch.surface[m->element.patch[el]] != 0)
 			continue;
-		assert_true(n[2] > .99);
+		assert_that(n[2], >, .99);
 		for (size_t k = 0; k < 3; k++)
 			v3_mad(x, 1. / 3, &m->vertex[3 * (size_t)m->element.corner[3 * (size_t)el + k]], x);
 		double exact = lambert(x, n, ceiling, 4), d = h[2 * el] / exact - 1;
 		squares += m->element.area[el] * d * d;
 		area += m->element.area[el];
 	}
-	assert_true(fabs(area - 1) < 1e-9);
+	assert_near(area, 1, 1e-9);
 	free(h);
 	ff_free(&f);
 	return sqrt(squares / area);
@@ -144,7 +140,8 @@ static void gathered(void **state)
 	make(&m, 0, 0);
 	double a = floor_error(&m, &own), b = floor_error(&m, &gathers);
 	print_message("own rays %.4f, gathered %.4f\n", a, b);
-	assert_true(b < .058 && b < a / 2);
+	assert_that(b, <, .058);
+	assert_that(b, <, a / 2);
 	model_free(&m);
 }
 
@@ -157,7 +154,7 @@ static void emitter_seen(void **state)
 	make(&m, 1, 0);
 	double a = floor_error(&m, &sees);
 	print_message("emitter %.4f\n", a);
-	assert_true(a < .002);
+	assert_that(a, <, .002);
 	model_free(&m);
 }
 
@@ -188,8 +185,8 @@ static void hidden(void **state)
 			flux[1] += area * h[1][i];
 		}
 		print_message("surface %u: %.4f\n", from, sqrt(squares / sum));
-		assert_true(sqrt(squares / sum) < .09);
-		assert_true(fabs(flux[1] / flux[0] - 1) < 1e-9);
+		assert_that(sqrt(squares / sum), <, .09);
+		assert_near(flux[1] / flux[0], 1, 1e-9);
 		free(h[0]);
 		free(h[1]);
 	}
@@ -224,8 +221,8 @@ static void open_scene(void **state)
 			escape += f.block.escape[f.row.block[r]] * f.row.scale[r] *
 			          m.patch.area[f.row.side[r] >> 1];
 	print_message("F %.6f\n", got);
-	assert_true(fabs(got - .199825) < .001);
-	assert_true(fabs(got + escape - 1) < 1e-9);
+	assert_near(got, .199825, .001);
+	assert_near(got + escape, 1, 1e-9);
 	free(h);
 	ff_free(&f);
 	model_free(&m);
@@ -265,7 +262,7 @@ static void close_by(void **state)
 
 	(void)state;
 	o.rays = 65536;
-	assert_true(fabs(at_a_right_angle(&o, .12) - .200044) < 2e-4);
+	assert_near(at_a_right_angle(&o, .12), .200044, 2e-4);
 }
 
 /* By formula, also where elements are as large as the patch. */
@@ -276,7 +273,7 @@ static void by_formula(void **state)
 	(void)state;
 	o.method = FF_AUTO;
 	o.target = 1e-4;
-	assert_true(fabs(at_a_right_angle(&o, 2) - .200044) < 1e-6);
+	assert_near(at_a_right_angle(&o, 2), .200044, 1e-6);
 }
 
 static void any_threads(void **state)
@@ -337,11 +334,13 @@ static void rays_go_where_light_is(void **state)
 	uint32_t most, least;
 
 	(void)state;
-	assert_true(shared_rays(0, &most, &least) == 1);
+	assert_that(shared_rays(0, &most, &least), ==, 1);
 	double part = shared_rays(1, &most, &least);
-	assert_true(part > .5 && part < .95);
+	assert_that(part, >, .5);
+	assert_that(part, <, .95);
 	assert_int_equal(most, 4096);
-	assert_true(least >= 4096 >> FF_HALVINGS && least < 4096);
+	assert_that(least, >=, 4096 >> FF_HALVINGS);
+	assert_that(least, <, 4096);
 	assert_int_equal(ff_most_halvings(8), 1);
 	assert_int_equal(ff_most_halvings(4 * 3), 0);
 	assert_int_equal(ff_most_halvings(4096), FF_HALVINGS);

@@ -56,7 +56,7 @@ static const double *corner(const struct model *m, size_t t, size_t k)
 
 #define assert_point(p, x, y, z) do { \
 	const double *q_ = (p); \
-	assert_true(fabs(q_[0] - (x)) + fabs(q_[1] - (y)) + fabs(q_[2] - (z)) < 1e-12); \
+	assert_that(fabs(q_[0] - (x)) + fabs(q_[1] - (y)) + fabs(q_[2] - (z)), <, 1e-12); \
 } while (0)
 
 static void test_base(void **state)
@@ -76,7 +76,8 @@ static void test_base(void **state)
 	assert_int_equal(s.m.material.one_sided[0], 1);
 	assert_int_equal(s.m.cameras, 1);
 	assert_string_equal(s.m.camera[0].name, "eye");
-	assert_true(s.m.camera[0].yfov == 1 && s.m.camera[0].aspect == 0);
+	assert_that(s.m.camera[0].yfov, ==, 1);
+	assert_that(s.m.camera[0].aspect, ==, 0);
 	assert_int_equal(strlen(s.r.digest), 32);
 	assert_int_equal(s.r.nodes, 2);
 	assert_int_equal(s.r.instances, 1);
@@ -258,7 +259,7 @@ static void test_cameras(void **state)
 
 	(void)state;
 	assert_string_equal(c->name, "camera0");
-	assert_true(c->aspect == 2);
+	assert_that(c->aspect, ==, 2);
 	assert_point(c->to_world + 8, -1, 0, 0); /* unit columns, right-handed */
 	assert_point(c->to_world + 4, 0, 1, 0);
 	assert_point(c->to_world, 0, 0, 1);
@@ -267,7 +268,8 @@ static void test_cameras(void **state)
 	s = read_edited("{'type':'perspective','perspective':{'yfov':1,'znear':0.1}}",
 	    "{'type':'orthographic','orthographic':{'xmag':2,'ymag':1,'znear':0,'zfar':9}}",
 	    NULL);
-	assert_true(s.m.camera->orthographic && s.m.camera->xmag == 2);
+	assert_true(s.m.camera->orthographic);
+	assert_that(s.m.camera->xmag, ==, 2);
 	end(&s);
 }
 
@@ -280,7 +282,6 @@ static struct scene paint(const char *material)
 	return read_edited(PAINT, material, NULL);
 }
 
-#define assert_near(a, b) assert_true(fabs((a) - (b)) < 1e-12)
 
 static void test_dielectric(void **state)
 {
@@ -292,13 +293,13 @@ static void test_dielectric(void **state)
 
 	(void)state;
 	assert_int_equal(s.m.bands, 3);
-	assert_near(m->rho_s[0], .04);
-	assert_near(m->rho_d[1], .96 * .25);
-	assert_near(m->rho_d[3 + 2], .96 * .125);
-	assert_near(m->alpha[0], (2 / .0625 - 2) / 4);
+	assert_near(m->rho_s[0], .04, 1e-12);
+	assert_near(m->rho_d[1], .96 * .25, 1e-12);
+	assert_near(m->rho_d[3 + 2], .96 * .125, 1e-12);
+	assert_near(m->alpha[0], (2 / .0625 - 2) / 4, 1e-12);
 	assert_true(isinf(m->beta[0]));
-	assert_near(m->emission[0], 5);
-	assert_near(m->emission[3 + 1], 10);
+	assert_near(m->emission[0], 5, 1e-12);
+	assert_near(m->emission[3 + 1], 10, 1e-12);
 	assert_int_equal(m->one_sided[0], 0);
 	assert_int_equal(s.r.notes, 0);
 	end(&s);
@@ -310,21 +311,21 @@ static void test_folding(void **state)
 	                       "{'baseColorFactor':[0.5,0.5,0.5,1]}}");
 
 	(void)state;
-	assert_near(s.m.material.rho_d[0], .5); /* plain glTF: metallic 1, roughness 1 */
-	assert_true(s.m.material.rho_s[0] == 0);
+	assert_near(s.m.material.rho_d[0], .5, 1e-12); /* plain glTF: metallic 1, roughness 1 */
+	assert_that(s.m.material.rho_s[0], ==, 0);
 	assert_true(isinf(s.m.material.alpha[0]));
 	assert_true(noted(&s, "material paint: its reflected lobe is folded"));
 	end(&s);
 	s = paint("{'name':'paint','pbrMetallicRoughness':"
 	          "{'metallicFactor':0,'roughnessFactor':0.1}}");
-	assert_near(s.m.material.rho_d[0], 1); /* .04 of 1 is weak; energy kept */
+	assert_near(s.m.material.rho_d[0], 1, 1e-12); /* .04 of 1 is weak; energy kept */
 	assert_true(noted(&s, "its share of the albedo, 0.04, is below 0.05"));
 	end(&s);
 	struct gltf_options o = GLTF_OPTIONS_DEFAULT;
 	o.min_directional = 0;
 	s = read_with(o, PAINT, "{'pbrMetallicRoughness':{'metallicFactor':0,"
 	              "'roughnessFactor':0}}", NULL);
-	assert_near(s.m.material.rho_s[0], .04);
+	assert_near(s.m.material.rho_s[0], .04, 1e-12);
 	assert_true(isinf(s.m.material.alpha[0]));
 	assert_string_equal(s.m.material.name[0], "material0");
 	end(&s);
@@ -341,29 +342,29 @@ static void test_transmission(void **state)
 	const struct materials *m = &s.m.material;
 
 	(void)state;
-	assert_near(m->rho_s[0], .25); /* ((3 - 1) / (3 + 1))^2 */
-	assert_near(m->tau_s[0], .75 * .5 * .8);
-	assert_near(m->tau_d[0], .75 * .5 * .25 * .5);
-	assert_near(m->rho_d[0], .75 * .5 * .75 * .8);
+	assert_near(m->rho_s[0], .25, 1e-12); /* ((3 - 1) / (3 + 1))^2 */
+	assert_near(m->tau_s[0], .75 * .5 * .8, 1e-12);
+	assert_near(m->tau_d[0], .75 * .5 * .25 * .5, 1e-12);
+	assert_near(m->rho_d[0], .75 * .5 * .75 * .8, 1e-12);
 	assert_int_equal(m->one_sided[0], 0);
-	assert_near(m->tau_s[1], m->tau_s[0]);
+	assert_near(m->tau_s[1], m->tau_s[0], 1e-12);
 	end(&s);
 	s = paint("{'alphaMode':'BLEND','pbrMetallicRoughness':"
 	          "{'baseColorFactor':[0.5,0.5,0.5,0.25]}}");
-	assert_near(s.m.material.tau_s[0], .75);
-	assert_near(s.m.material.rho_d[0], .125);
+	assert_near(s.m.material.tau_s[0], .75, 1e-12);
+	assert_near(s.m.material.rho_d[0], .125, 1e-12);
 	assert_true(isinf(s.m.material.beta[0]));
 	end(&s);
 	s = paint("{'alphaMode':'MASK','pbrMetallicRoughness':"
 	          "{'baseColorFactor':[0.5,0.5,0.5,0.25]}}");
-	assert_near(s.m.material.tau_s[0], 1);
+	assert_near(s.m.material.tau_s[0], 1, 1e-12);
 	end(&s);
 	s = paint("{'pbrMetallicRoughness':{'metallicFactor':0,'roughnessFactor':0,"
 	    "'baseColorFactor':[0,0,0,1]},'extensions':{'KHR_materials_specular':"
 	    "{'specularFactor':0.5,'specularColorFactor':[1,0.5,30]}}}");
-	assert_near(s.m.material.rho_s[0], .02);
-	assert_near(s.m.material.rho_s[1], .01);
-	assert_near(s.m.material.rho_s[2], .5);
+	assert_near(s.m.material.rho_s[0], .02, 1e-12);
+	assert_near(s.m.material.rho_s[1], .01, 1e-12);
+	assert_near(s.m.material.rho_s[2], .5, 1e-12);
 	end(&s);
 }
 
@@ -376,22 +377,22 @@ static void test_extras(void **state)
 
 	(void)state;
 	assert_int_equal(s.m.bands, 1);
-	assert_near(m->rho_d[0], .5);
-	assert_near(m->rho_d[1], .25);
-	assert_near(m->rho_s[0], .01); /* weak and wide, but explicit: not folded */
-	assert_near(m->alpha[0], .5);
+	assert_near(m->rho_d[0], .5, 1e-12);
+	assert_near(m->rho_d[1], .25, 1e-12);
+	assert_near(m->rho_s[0], .01, 1e-12); /* weak and wide, but explicit: not folded */
+	assert_near(m->alpha[0], .5, 1e-12);
 	assert_true(isinf(m->alpha[1]) && isinf(m->beta[1]));
-	assert_near(m->tau_s[1], .5);
-	assert_near(m->emission[0], 1);
-	assert_near(m->emission[1], 0);
-	assert_near(m->emission_exponent[0], 3);
-	assert_near(m->emission_exponent[1], 1); /* dark */
+	assert_near(m->tau_s[1], .5, 1e-12);
+	assert_near(m->emission[0], 1, 1e-12);
+	assert_near(m->emission[1], 0, 1e-12);
+	assert_near(m->emission_exponent[0], 3, 1e-12);
+	assert_near(m->emission_exponent[1], 1, 1e-12); /* dark */
 	assert_int_equal(m->one_sided[0], 0);
 	assert_true(noted(&s, "not reciprocal"));
 	end(&s);
 	s = paint("{'emissiveFactor':[1,1,1],'extras':{'twopass':{'emission_back':2}}}");
-	assert_near(s.m.material.emission[0], 1);
-	assert_near(s.m.material.emission[1], 2);
+	assert_near(s.m.material.emission[0], 1, 1e-12);
+	assert_near(s.m.material.emission[1], 2, 1e-12);
 	assert_int_equal(s.m.material.one_sided[0], 0);
 	end(&s);
 }
@@ -403,8 +404,8 @@ static void test_bands(void **state)
 
 	(void)state;
 	assert_int_equal(s.m.bands, 4);
-	assert_near(s.m.material.rho_d[3], .4);
-	assert_near(s.m.material.rho_s[7], 0); /* black back */
+	assert_near(s.m.material.rho_d[3], .4, 1e-12);
+	assert_near(s.m.material.rho_s[7], 0, 1e-12); /* black back */
 	end(&s);
 	s = paint("{'extras':{'twopass':{'rho_d':[0.5,0.5,0.5]}}}");
 	assert_int_equal(s.m.bands, 1);
@@ -412,11 +413,11 @@ static void test_bands(void **state)
 	o.bands = 3;
 	s = read_with(o, PAINT, "{'extras':{'twopass':{'rho_d':0.5}}}", NULL);
 	assert_int_equal(s.m.bands, 3);
-	assert_near(s.m.material.rho_d[2], .5);
+	assert_near(s.m.material.rho_d[2], .5, 1e-12);
 	end(&s);
 	o.bands = 1;
 	s = read_with(o, PAINT, "{'extras':{'twopass':{'rho_d':[1,0.5,0]}}}", NULL);
-	assert_near(s.m.material.rho_d[0], .2126 + .7152 / 2);
+	assert_near(s.m.material.rho_d[0], .2126 + .7152 / 2, 1e-12);
 	assert_true(noted(&s, "luminance"));
 	end(&s);
 }
@@ -429,8 +430,8 @@ static void test_clamp(void **state)
 	o.clamp = 1;
 	struct scene s = read_with(o, PAINT,
 	                           "{'extras':{'twopass':{'rho_d':0.9,'rho_s':0.3}}}", NULL);
-	assert_near(s.m.material.rho_d[0], .75);
-	assert_near(s.m.material.rho_s[0], .25);
+	assert_near(s.m.material.rho_d[0], .75, 1e-12);
+	assert_near(s.m.material.rho_s[0], .25, 1e-12);
 	assert_true(noted(&s, "is rescaled to 1"));
 	end(&s);
 }
@@ -474,14 +475,14 @@ static void test_rules_keep_energy(void **state)
 		bsdf_from_gltf(&g, 0, 0, &s, &f);
 		bsdf_from_gltf(&g, 2, INFINITY, &folded, &f);
 		for (int b = 0; b < 3; b++) {
-			assert_true(bsdf_side_albedo(&s, b) <= 1 + 1e-12);
-			assert_near(bsdf_side_albedo(&s, b), bsdf_side_albedo(&folded, b));
-			assert_near(folded.rho_s[b], 0);
-			assert_near(folded.tau_s[b], 1 - g.opacity);
+			assert_that(bsdf_side_albedo(&s, b), <=, 1 + 1e-12);
+			assert_near(bsdf_side_albedo(&s, b), bsdf_side_albedo(&folded, b), 1e-12);
+			assert_near(folded.rho_s[b], 0, 1e-12);
+			assert_near(folded.tau_s[b], 1 - g.opacity, 1e-12);
 		}
 	}
 	assert_true(isinf(bsdf_lobe_exponent(0)));
-	assert_near(bsdf_lobe_exponent(1), 0);
+	assert_near(bsdf_lobe_exponent(1), 0, 1e-12);
 }
 
 int main(void)

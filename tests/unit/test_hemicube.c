@@ -1,9 +1,4 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <math.h>
 #include <stdlib.h>
@@ -12,6 +7,7 @@
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
 #include "lib/hemicube/hemicube.h"
+#include "tests/unit/fixtures/check.h"
 
 /* Just enough of a model: vertices and elements. */
 static struct model model_new(size_t vertices, size_t elements)
@@ -168,7 +164,7 @@ static double mean_factor(const struct model *m, int n)
 			back += f[2 * k + BACK];
 		}
 	}
-	assert_true(back == 0);
+	assert_that(back, ==, 0);
 	free(f);
 	stage_free(&s);
 	return sum;
@@ -182,7 +178,7 @@ static void parallel_squares(void **state)
 	(void)state;
 	add_grid(&m, o, u, v, 8);
 	/* Howell's catalogue of configuration factors, C-11. */
-	assert_true(fabs(mean_factor(&m, 128) / .199824895698387 - 1) < 1e-3);
+	assert_near(mean_factor(&m, 128) / .199824895698387, 1, 1e-3);
 	model_free(&m);
 }
 
@@ -194,7 +190,7 @@ static void perpendicular_squares(void **state)
 	(void)state;
 	add_grid(&m, o, u, v, 8);
 	/* Howell's catalogue of configuration factors, C-14. */
-	assert_true(fabs(mean_factor(&m, 128) / .2000437760754 - 1) < 1e-2);
+	assert_near(mean_factor(&m, 128) / .2000437760754, 1, 1e-2);
 	model_free(&m);
 }
 
@@ -218,7 +214,8 @@ static void closed_cube_has_no_holes(void **state)
 			for (size_t p = 0; p < s.grid.pixels; p++) {
 				double d = ff_hemicube_distance(&s.cube, p);
 				assert_int_equal(s.cube.item[p] & 1, FRONT);
-				assert_true(d > 0 && d < 1.75 * size[k]);
+				assert_that(d, >, 0);
+				assert_that(d, <, 1.75 * size[k]);
 			}
 		}
 		stage_free(&s);
@@ -253,7 +250,7 @@ static void closed_cube_from_its_faces(void **state)
 			assert_int_equal(count_void(&s), 0);
 			/* The other half of the face lies in the horizon. */
 			for (size_t p = 0; p < s.grid.pixels; p++)
-				assert_true(s.cube.item[p] / 4 != own / 2);
+				assert_that(s.cube.item[p] / 4, !=, own / 2);
 		}
 		stage_free(&s);
 		model_free(&m);
@@ -379,7 +376,7 @@ static void soup_agrees_with_rays(void **state)
 		model_free(&m);
 	}
 	/* Float depths: only triangles that cross within a pixel may swap. */
-	assert_true(differ * 5000 <= pixels);
+	assert_that(differ * 5000, <=, pixels);
 }
 
 /* Edges of the grid run through pixel centres when the cube is aligned with it. */
@@ -408,8 +405,8 @@ static void aligned_grid(void **state)
 		double unseen = ff_hemicube_sum(&s.cube, f);
 		for (size_t k = 0; k < 2 * m.element.n; k++)
 			sum += f[k];
-		assert_true(fabs(sum + unseen - 1) < 1e-12);
-		assert_true(fabs(sum / exact - 1) < (i ? 3e-3 : 2e-2));
+		assert_near(sum + unseen, 1, 1e-12);
+		assert_near(sum / exact, 1, (i ? 3e-3 : 2e-2));
 	}
 	stage_free(&s);
 	model_free(&m);
@@ -487,7 +484,7 @@ static void triangles_give_the_same_elements(void **state)
 		}
 		pixels += s.grid.pixels;
 	}
-	assert_true(differ * 5000 < pixels);
+	assert_that(differ * 5000, <, pixels);
 	stage_free(&s);
 	stage_free(&e);
 	free(coarse.vertex);
@@ -523,7 +520,7 @@ static void empty_scene_escapes(void **state)
 
 	(void)state;
 	draw(&s, eye, frame, HEMICUBE_VOID);
-	assert_true(fabs(ff_hemicube_sum(&s.cube, NULL) - 1) < 1e-14);
+	assert_near(ff_hemicube_sum(&s.cube, NULL), 1, 1e-14);
 	stage_free(&s);
 	ff_hemicube_scene_free(NULL);
 	model_free(&m);

@@ -1,9 +1,4 @@
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
 
 #include <math.h>
 #include <string.h>
@@ -11,6 +6,7 @@
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
 #include "lib/hemicube/hemicube.h"
+#include "tests/unit/fixtures/check.h"
 
 static void delta_factors_sum_to_one(void **state)
 {
@@ -27,11 +23,12 @@ static void delta_factors_sum_to_one(void **state)
 			sum += g.delta[i];
 			angle += g.solid_angle[i];
 			cosines += g.solid_angle[i] * g.direction[3 * i + 2];
-			assert_true(g.delta[i] > 0 && g.solid_angle[i] > 0);
+			assert_that(g.delta[i], >, 0);
+			assert_that(g.solid_angle[i], >, 0);
 		}
-		assert_true(fabsl(sum - 1) < 1e-15L);
-		assert_true(fabsl(angle - 2 * acosl(-1)) < 1e-14L);
-		assert_true(fabsl(cosines / acosl(-1) - 1) < 1.L / (n[k] * n[k]));
+		assert_that(fabsl(sum - 1), <, 1e-15L);
+		assert_that(fabsl(angle - 2 * acosl(-1)), <, 1e-14L);
+		assert_that(fabsl(cosines / acosl(-1) - 1), <, 1.L / (n[k] * n[k]));
 		ff_hemicube_grid_free(&g);
 	}
 }
@@ -59,8 +56,8 @@ static void delta_factors_are_integrals(void **state)
 			sum += w * (side ? v : 1) / (s * s) / acos(-1);
 			angle += w / (s * sqrt(s));
 		}
-		assert_true(fabs(g.delta[i] / sum - 1) < 1e-7);
-		assert_true(fabs(g.solid_angle[i] / angle - 1) < 1e-7);
+		assert_near(g.delta[i] / sum, 1, 1e-7);
+		assert_near(g.solid_angle[i] / angle, 1, 1e-7);
 	}
 	ff_hemicube_grid_free(&g);
 }
@@ -80,14 +77,14 @@ static void lookup_inverts_direction(void **state)
 		for (int i = 0; i < 10000; i++) {
 			double d[3] = { rng_uniform(&r) - .5, rng_uniform(&r) - .5, rng_uniform(&r) };
 			size_t p = ff_hemicube_lookup(&g, d);
-			assert_true(p < g.pixels);
+			assert_that(p, <, g.pixels);
 			v3_normalise(d);
-			assert_true(v3_dot(d, &g.direction[3 * p]) > cos(1.5 / n[k]));
+			assert_that(v3_dot(d, &g.direction[3 * p]), >, cos(1.5 / n[k]));
 		}
 		const double edge[][3] = { { 1, 1, 1 }, { -1, -1, -1 }, { 1, 0, 0 }, { 0, -1, 0 },
 			{ -1, 1, 0 }, { 0, 0, 1 }, { 1, -1, 1 }, { 0, 1, -2 } };
 		for (size_t i = 0; i < sizeof edge / sizeof *edge; i++)
-			assert_true(ff_hemicube_lookup(&g, edge[i]) < g.pixels);
+			assert_that(ff_hemicube_lookup(&g, edge[i]), <, g.pixels);
 		ff_hemicube_grid_free(&g);
 	}
 }

@@ -1,12 +1,7 @@
 /* Surfaces are cut where others cross or touch them, and nowhere else. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
 #include "lib/geometry/box_tree.h"
 #include "lib/mesh/imprint.h"
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/shapes.h"
 
 enum { PLACES = 4 };
@@ -33,9 +28,8 @@ static void check_uvs(const struct model *m, double scale)
 {
 	for (size_t i = 0; i < 3 * m->triangle.n; i++) {
 		const double *x = &m->vertex[3 * (size_t)m->triangle.corner[i]];
-		assert_true(fabs((double)m->triangle.uv[2 * i] - (x[0] + 2 * x[1] - x[2])) <=
-		            1e-6 * scale);
-		assert_true(fabs((double)m->triangle.uv[2 * i + 1] - (x[2] - x[0])) <= 1e-6 * scale);
+		assert_near((double)m->triangle.uv[2 * i], (x[0] + 2 * x[1] - x[2]), 1e-6 * scale);
+		assert_near((double)m->triangle.uv[2 * i + 1], (x[2] - x[0]), 1e-6 * scale);
 	}
 }
 
@@ -83,7 +77,7 @@ static struct mesh_report mesh(struct model *m, double size)
 		reach = fmax(reach, fabs(m->vertex[i]));
 	linear_uvs(m);
 	struct mesh_report r = run(m, sizes(2 * size, size, 0));
-	assert_true(fabs(input_area(m) - area) <= (1e-12 + 1e-14 * reach / r.diagonal) * area);
+	assert_near(input_area(m), area, (1e-12 + 1e-14 * reach / r.diagonal) * area);
 	check_uvs(m, reach);
 	check_no_contacts(m, size);
 	return r;
@@ -158,11 +152,12 @@ static void test_footprint(void **state)
 			double unit = v3_length(frame[1]);
 			struct mesh_report r = mesh(&m, .1 * unit);
 			assert_int_equal(r.cut, 2);
-			assert_true(r.lines >= 4 && r.lines <= 20);
+			assert_that(r.lines, >=, 4);
+			assert_that(r.lines, <=, 20);
 			double area = area_within(&m, 0, frame, within_block);
 			if (!one_surface)
-				assert_true(fabs(area - .09 * unit * unit) < 1e-11 * unit * unit);
-			assert_true(worst_shape(&m) > .1);
+				assert_near(area, .09 * unit * unit, 1e-11 * unit * unit);
+			assert_that(worst_shape(&m), >, .1);
 			mesh_report_free(&r);
 			model_free(&m);
 		}
@@ -184,7 +179,7 @@ static void test_patches_end_at_lines(void **state)
 	for (size_t p = 0; p < m.patch.n; p++)
 		patches += m.surface.n && m.patch.surface[p] == 0;
 	assert_int_equal(patches, 2);
-	assert_true(fabs(area_within(&m, 0, frame, within_block) - .09) < 1e-12);
+	assert_near(area_within(&m, 0, frame, within_block), .09, 1e-12);
 	for (size_t p = 0; p < m.patch.n; p++)
 		if (m.patch.surface[p] == 0)
 			assert_true(fabs(m.patch.area[p] - .09) < 1e-12 ||
@@ -217,8 +212,9 @@ static void test_crossing(void **state)
 		assert_int_equal(r.cut, 4);
 		/* One line through either quad, halved where it crosses the diagonal, and
 		 * once more to keep the pieces in shape. */
-		assert_true(r.lines >= 4 && r.lines <= 6);
-		assert_true(fabs(area_within(&m, 0, frame, left_half) - .37 * unit * unit) <
+		assert_that(r.lines, >=, 4);
+		assert_that(r.lines, <=, 6);
+		assert_near(area_within(&m, 0, frame, left_half), .37 * unit * unit,
 		            1e-11 * unit * unit);
 		mesh_report_free(&r);
 		model_free(&m);
@@ -252,7 +248,7 @@ static void test_wall(void **state)
 			if (g.start[i + 1] - g.start[i] == 1)
 				open += v3_length(d);
 		}
-		assert_true(fabs(open - (4 + 2 * .7 + 2 * 1.7) * unit) < 1e-9 * unit);
+		assert_near(open, (4 + 2 * .7 + 2 * 1.7) * unit, 1e-9 * unit);
 		geo_half_edges_free(&g);
 		mesh_report_free(&r);
 		model_free(&m);
@@ -288,7 +284,8 @@ static void test_flush(void **state)
 	transform(&m, 1, 1, 0);
 	struct mesh_report r = run(&m, sizes(.2, .1, 0));
 	assert_int_equal(r.cut, 1);
-	assert_true(r.lines >= 4 && r.lines <= 8);
+	assert_that(r.lines, >=, 4);
+	assert_that(r.lines, <=, 8);
 	mesh_report_free(&r);
 	model_free(&m);
 }
@@ -320,8 +317,8 @@ static void test_close(void **state)
 			struct mesh_report r = run(&m, sizes(.2 * unit, .1 * unit, 0));
 			assert_int_equal(r.cut, i < 2 ? 2 : 0);
 			if (i < 2)
-				assert_true(fabs(area_within(&m, 0, frame, within_sheet) -
-				                 .12 * unit * unit) < 1e-9 * unit * unit);
+				assert_near(area_within(&m, 0, frame, within_sheet),
+				            .12 * unit * unit, 1e-9 * unit * unit);
 			mesh_report_free(&r);
 			model_free(&m);
 		}
@@ -353,10 +350,10 @@ static void test_covered(void **state)
 			double unit = v3_length(frame[1]);
 			struct mesh_report r = run(&m, sizes(.2 * unit, .1 * unit, 0));
 			double gone = i == 3 ? 0 : i == 2 ? .004 : .12;
-			assert_true((r.covered > 0) == (i < 3));
+			assert_that((r.covered > 0), ==, (i < 3));
 			assert_int_equal(r.merged > 0, i == 1); /* the floor shows on the sheet's back */
 			double area = input_area(&m) / (unit * unit), given = i == 2 ? 1.004 : 1.12;
-			assert_true(fabs(area - given + gone) < 1e-9);
+			assert_that(fabs(area - given + gone), <, 1e-9);
 			mesh_report_free(&r);
 			model_free(&m);
 		}
@@ -416,7 +413,7 @@ static void test_random(void **state)
 		mesh_report_free(&r);
 		model_free(&m);
 	}
-	assert_true(cut > 100);
+	assert_that(cut, >, 100);
 }
 
 /* Walls in a grid, all on one floor. */

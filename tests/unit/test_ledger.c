@@ -1,13 +1,8 @@
 /* The ledger and convergence where light is hardly absorbed or not at all, and where it is
  * hardly there. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
-
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/grid.h"
 #include "tests/unit/fixtures/solved.h"
 
@@ -92,9 +87,9 @@ static void assert_balanced(const struct model *m, int groups, double stop, doub
 	solved_finish(&x, stop);
 	if (x.r.residual > 1e-13 || x.r.passes > 40)
 		print_error("residual %g, %g passes\n", x.r.residual, x.r.passes);
-	assert_true(x.r.residual <= 1e-13);
-	assert_true(x.r.passes <= 40);
-	assert_true(x.r.unshot <= stop);
+	assert_that(x.r.residual, <=, 1e-13);
+	assert_that(x.r.passes, <=, 40);
+	assert_that(x.r.unshot, <=, stop);
 	if (bound)
 		*bound = x.r.bound;
 	solved_free(&x);
@@ -153,7 +148,7 @@ static void test_white_band(void **state)
 	solved_free(&x);
 	m.material.emission[model_material_at(&m.material, 1, FRONT)] = 0;
 	assert_balanced(&m, 0, 1e-4, &bound);
-	assert_true(bound < 4e-4);
+	assert_that(bound, <, 4e-4);
 	model_free(&m);
 }
 

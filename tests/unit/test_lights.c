@@ -1,12 +1,6 @@
 /* Punctual lights: their rays, form factors, solution, direct light and particles,
  * against closed forms. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
@@ -15,6 +9,7 @@
 #include "lib/radiosity/radiosity.h"
 #include "lib/reference/pathtrace.h"
 #include "lib/scatter/bsdf.h"
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/grid.h"
 #include "tests/unit/fixtures/memory_ff.h"
 
@@ -97,7 +92,7 @@ static void solve(const struct model *m, struct solution *s)
 	assert_int_equal(radiosity_begin(s, m, &t, 0, &e), 0);
 	assert_int_equal(radiosity_shoot(s, &t, &ro, NULL, &r, &e), 0);
 	assert_int_equal(radiosity_element_irradiance(s, &t, 2, &r, &e), 0);
-	assert_true(r.residual <= 1e-12);
+	assert_that(r.residual, <=, 1e-12);
 	radiosity_transport_free(&t);
 	ff_free(&f);
 }
@@ -149,7 +144,7 @@ static void rays_carry_the_flux(void **state)
 		model_light_ray(&m.light, 0, u, 0, org, dir);
 		double c = v3_dot(dir, m.light.direction);
 		near(v3_length(dir), 1, 1e-12);
-		assert_true(c >= cos(outer) - 1e-12);
+		assert_that(c, >=, cos(outer) - 1e-12);
 		core += c >= cos(inner);
 		rim += c < (cos(inner) + cos(outer)) / 2; /* an eighth of the rim's flux */
 	}
@@ -183,7 +178,7 @@ static double direct(const struct model *m, double x, double y)
 	assert_non_null(w);
 	occ_direct_begin(w, 0);
 	assert_int_equal(occ_direct_at(w, at, 1, 1e-3, &nothing, &h, &error, &e), 0);
-	assert_true(error == 0);
+	assert_that(error, ==, 0);
 	occ_direct_worker_free(w);
 	occ_direct_free(d);
 	ray_scene_free(rays);
@@ -483,7 +478,7 @@ static void lobes_apart(void **state)
 	v3_normalise(wo);
 	bsdf_eval(&m, 0, n, wi, wo, &all);
 	bsdf_eval_lobes(&m, 0, n, wi, wo, &lobe);
-	assert_true(lobe > 0);
+	assert_that(lobe, >, 0);
 	near(all - lobe, .4 / PI, 1e-15);
 	model_free(&m);
 }

@@ -1,16 +1,11 @@
 /* Phong lobes: normaliser and albedo against tables, sampling against moments. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
 #include "lib/scatter/lobe.h"
 #include "lib/scatter/lobe_table.h"
+#include "tests/unit/fixtures/check.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -102,13 +97,6 @@ static double cosine(double degrees)
 	return degrees == 90 ? 0 : cos(degrees * pi / 180);
 }
 
-static void assert_close(double got, double expected, double relative)
-{
-	if (!(fabs(got - expected) <= relative * fabs(expected)))
-		fail_msg("%.17g instead of %.17g, off by %.2g (allowed %.2g)", got, expected,
-		         got / expected - 1, relative);
-}
-
 static void test_normaliser_table(void **state)
 {
 	(void)state;
@@ -177,10 +165,13 @@ static void test_table(void **state)
 static void test_power(void **state)
 {
 	(void)state;
-	assert_true(bsdf_lobe_power(0, 1e-300) == 1 && bsdf_lobe_power(0, 0) == 0);
-	assert_true(bsdf_lobe_power(2.5, -.5) == 0 && bsdf_lobe_power(2.5, 0) == 0);
-	assert_true(bsdf_lobe_power(1e8, 1) == 1 && bsdf_lobe_power(3, 1 + 1e-15) == 1);
-	assert_true(bsdf_lobe_power(1e8, .5) == 0);
+	assert_that(bsdf_lobe_power(0, 1e-300), ==, 1);
+	assert_that(bsdf_lobe_power(0, 0), ==, 0);
+	assert_that(bsdf_lobe_power(2.5, -.5), ==, 0);
+	assert_that(bsdf_lobe_power(2.5, 0), ==, 0);
+	assert_that(bsdf_lobe_power(1e8, 1), ==, 1);
+	assert_that(bsdf_lobe_power(3, 1 + 1e-15), ==, 1);
+	assert_that(bsdf_lobe_power(1e8, .5), ==, 0);
 	assert_close(bsdf_lobe_power(2.5, .3), pow(.3, 2.5), 1e-14);
 }
 
@@ -245,13 +236,13 @@ static void test_sample_whole(void **state)
 		for (int s = 0; s < N; s++) {
 			double u[2] = { rng_uniform(&r), rng_uniform(&r) }, w[3];
 			bsdf_lobe_sample_whole(k[i], axis, u, w);
-			assert_true(fabs(v3_dot(w, w) - 1) < 1e-14);
+			assert_near(v3_dot(w, w), 1, 1e-14);
 			double x = bsdf_lobe_power(k[i] + 1, v3_dot(axis, w));
 			mean += x / N;
 			square += x * x / N;
 		}
-		assert_true(fabs(mean - 1. / 2) < 5 * sqrt(1. / 12 / N));
-		assert_true(fabs(square - 1. / 3) < 5 * sqrt(4. / 45 / N));
+		assert_near(mean, 1. / 2, 5 * sqrt(1. / 12 / N));
+		assert_near(square, 1. / 3, 5 * sqrt(4. / 45 / N));
 	}
 }
 
@@ -266,7 +257,8 @@ static void test_sample_clipped(void **state)
 			double u[2] = { rng_sobol((uint32_t)s, 0, 1), rng_sobol((uint32_t)s, 1, 1) };
 			bsdf_lobe_sample(deg * deg, axis, n, u, w);
 			bsdf_lobe_sample(deg * deg, axis, n, u, again);
-			assert_true(w[2] > 0 && v3_dot(axis, w) > 0);
+			assert_that(w[2], >, 0);
+			assert_that(v3_dot(axis, w), >, 0);
 			assert_memory_equal(w, again, sizeof w);
 		}
 	/* the ends of the unit square, and an axis that rounding put below */
@@ -275,9 +267,11 @@ static void test_sample_clipped(void **state)
 		u[0] = i & 1 ? 1 - 0x1p-53 : 0;
 		u[1] = i & 2 ? 1 - 0x1p-53 : 0;
 		bsdf_lobe_sample(1e8, low, n, u, w);
-		assert_true(isfinite(w[0] + w[1] + w[2]) && w[2] >= 0);
+		assert_true(isfinite(w[0] + w[1] + w[2]));
+		assert_that(w[2], >=, 0);
 		bsdf_sample_cosine(n, u, w);
-		assert_true(isfinite(w[0] + w[1] + w[2]) && w[2] > 0);
+		assert_true(isfinite(w[0] + w[1] + w[2]));
+		assert_that(w[2], >, 0);
 	}
 }
 
@@ -288,7 +282,9 @@ static void test_mirror(void **state)
 
 	(void)state;
 	bsdf_lobe_mirror(l, n, r);
-	assert_true(fabs(r[0] + .6) < 1e-15 && r[1] == 0 && fabs(r[2] - .8) < 1e-15);
+	assert_that(fabs(r[0] + .6), <, 1e-15);
+	assert_that(r[1], ==, 0);
+	assert_near(r[2], .8, 1e-15);
 }
 
 int main(void)

@@ -1,12 +1,6 @@
 /* The element lookup of form-factor rays, against the split trees; samples of rays. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "lib/ray/locate.h"
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/shapes.h"
 
 /* Every random point is found in the element that the tree gives, or, within float32
@@ -29,7 +23,7 @@ static void agree(struct model *m, double patch, double element)
 		assert_int_equal(m->element.triangle[found], t);
 		other += found != model_locate(m, t, tree);
 	}
-	assert_true(other < tries / 1000);
+	assert_that(other, <, tries / 1000);
 	ray_locator_free(&l);
 	model_free(m);
 }

@@ -1,12 +1,7 @@
 /* Elements and patches of shapes whose right division is known. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
 #include <time.h>
 
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/shapes.h"
 
 static void test_square(void **state)
@@ -22,10 +17,10 @@ static void test_square(void **state)
 	for (size_t p = 0; p < m.patch.n; p++) {
 		assert_int_equal(m.patch.loop[p + 1], p + 1);
 		assert_int_equal(m.patch.loop_start[p + 1] - m.patch.loop_start[p], 4);
-		assert_true(fabs(m.patch.area[p] - 1. / 16) < 1e-15);
+		assert_near(m.patch.area[p], 1. / 16, 1e-15);
 	}
 	assert_int_equal(m.element.n, 64);
-	assert_true(r.area_back == r.area_front);
+	assert_that(r.area_back, ==, r.area_front);
 	assert_int_equal(r.open_edges, 4);
 	assert_int_equal(r.components, 1);
 	assert_int_equal(r.closed_components, 0);
@@ -67,7 +62,7 @@ static void test_rectangles(void **state)
 		assert_int_equal(m.patch.n, i == 2 ? 16 : 8);
 		double even = length[i] / (double)m.patch.n;
 		for (size_t p = 0; p < m.patch.n; p++)
-			assert_true(fabs(m.patch.area[p] - even) < (i == 2 ? .1 * even : 1e-12));
+			assert_near(m.patch.area[p], even, (i == 2 ? .1 * even : 1e-12));
 		if (i < 2)
 			assert_int_equal(m.patch.loop_indices, 4 * m.patch.n);
 		mesh_report_free(&r);
@@ -88,8 +83,8 @@ static void test_cube(void **state)
 	assert_int_equal(r.components, 1);
 	assert_int_equal(r.closed_components, 1);
 	assert_int_equal(r.open_edges, 0);
-	assert_true(fabs(r.area_front - 6) < 1e-14);
-	assert_true(r.area_back == 0);
+	assert_near(r.area_front, 6, 1e-14);
+	assert_that(r.area_back, ==, 0);
 	assert_int_equal(m.vertices, 8);
 	mesh_report_free(&r);
 	model_free(&m);
@@ -145,7 +140,7 @@ static void test_l_shape(void **state)
 	assert_int_equal(m.patch.loops, 2);
 	assert_int_equal(m.patch.loop_start[1], 6);
 	assert_int_equal(m.patch.loop_start[2], 10);
-	assert_true(fabs(m.patch.area[0] - 2.75) < 1e-12);
+	assert_near(m.patch.area[0], 2.75, 1e-12);
 	mesh_report_free(&r);
 	model_free(&m);
 
@@ -170,7 +165,7 @@ static void test_sphere(void **state)
 	assert_int_equal(m.element.n, 20480);
 	assert_int_equal(m.vertices, 10242);
 	assert_in_range(m.patch.n, 33, 160); /* a sphere has 33 cones of 20 degrees */
-	assert_true(r.planar_patches < 10); /* left-over single facets */
+	assert_that(r.planar_patches, <, 10); /* left-over single facets */
 	assert_int_equal(r.closed_components, 1);
 	mesh_report_free(&r);
 	model_free(&m);
@@ -303,11 +298,11 @@ static void test_permuted(void **state)
 	assert_int_equal(m[0].patch.n, m[1].patch.n);
 	assert_int_equal(m[0].element.n, m[1].element.n);
 	for (size_t p = 0; p < m[0].patch.n; p++)
-		assert_true(fabs(m[0].patch.area[p] - m[1].patch.area[p]) < 1e-14);
+		assert_near(m[0].patch.area[p], m[1].patch.area[p], 1e-14);
 	for (int i = 0; i < 2; i++)
 		qsort(m[i].element.area, m[i].element.n, sizeof(double), compare_doubles);
 	for (size_t i = 0; i < m[0].element.n; i++)
-		assert_true(m[0].element.area[i] == m[1].element.area[i]);
+		assert_that(m[0].element.area[i], ==, m[1].element.area[i]);
 	for (int i = 0; i < 2; i++) {
 		mesh_report_free(&r[i]);
 		model_free(&m[i]);
@@ -347,7 +342,7 @@ static void test_soup(void **state)
 	double seconds = (double)(clock() - begun) / CLOCKS_PER_SEC;
 	print_message("100k loose triangles: %.2f s\n", seconds);
 #ifndef __SANITIZE_ADDRESS__
-	assert_true(seconds < 2);
+	assert_that(seconds, <, 2);
 #endif
 	assert_in_range(m.element.n, 100000 - 10, 100000);
 	mesh_report_free(&r);
@@ -366,7 +361,7 @@ static void test_element_within_patch(void **state)
 		make_square(&m);
 		o.element_within_patch = 1;
 		struct mesh_report r = run(&m, o);
-		assert_true(r.element_size == (i ? .25 : .125));
+		assert_that(r.element_size, ==, (i ? .25 : .125));
 		assert_int_equal(m.patch.n, i ? 1 : 64);
 		mesh_report_free(&r);
 		model_free(&m);

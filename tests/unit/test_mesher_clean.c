@@ -1,10 +1,5 @@
 /* What the mesher drops, welds and merges. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/shapes.h"
 
 static void test_sliver(void **state)
@@ -28,7 +23,7 @@ static void test_sliver(void **state)
 		assert_int_equal(r.total.duplicate, 0);
 		assert_int_equal(r.components, 1);
 		assert_int_equal(r.open_edges, 8);
-		assert_true(fabs(r.area_front - 2.000001) < 1e-12);
+		assert_near(r.area_front, 2.000001, 1e-12);
 		mesh_report_free(&r);
 		model_free(&m);
 	}
@@ -58,7 +53,7 @@ static void test_degenerate(void **state)
 	assert_int_equal(r.total.degenerate, 3);
 	assert_int_equal(r.surface[1].degenerate, 3);
 	assert_int_equal(r.total.duplicate, 0);
-	assert_true(m.triangle.uv[6 * 2] == 5);
+	assert_that(m.triangle.uv[6 * 2], ==, 5);
 	mesh_report_free(&r);
 	model_free(&m);
 
@@ -101,8 +96,8 @@ static void test_duplicates(void **state)
 				uint32_t material = model_patch_material(&m, 0);
 				if (one_sided && opposite) {
 					assert_int_equal(m.material.one_sided[material], 0);
-					assert_true(m.material.rho_d[2 * material] == .5);
-					assert_true(m.material.rho_d[2 * material + 1] ==
+					assert_that(m.material.rho_d[2 * material], ==, .5);
+					assert_that(m.material.rho_d[2 * material + 1], ==,
 					            .5 + .01 * other);
 				} else {
 					assert_int_equal(material, 0);
@@ -130,7 +125,8 @@ static void test_partial_sandwich(void **state)
 	assert_int_equal(m.material.n, 3);
 	assert_string_equal(m.material.name[2], "s0|s1");
 	assert_int_equal(m.patch.n, 2);
-	assert_true(fabs(r.area_front - 2) < 1e-15 && fabs(r.area_back - 1) < 1e-15);
+	assert_near(r.area_front, 2, 1e-15);
+	assert_near(r.area_back, 1, 1e-15);
 	mesh_report_free(&r);
 	model_free(&m);
 }

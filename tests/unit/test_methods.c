@@ -112,7 +112,7 @@ static void test_furnace(void **state)
 	for (enum view_method k = VIEW_MESH; k <= VIEW_GATHER; k++) {
 		struct image im = render(&t, k, eye, target, 40, 30, 1);
 		for (size_t p = 0; p < 3 * 40 * 30; p++)
-			assert_true(fabs((double)im.pixel[p] * PI - 1) < 2e-6);
+			assert_near((double)im.pixel[p] * PI, 1, 2e-6);
 		picture_image_free(&im);
 	}
 	stage_free(&t);
@@ -172,10 +172,10 @@ static void test_mirror(void **state)
 	for (enum view_method k = VIEW_MESH; k <= VIEW_GATHER; k++) {
 		double straight = look(&t, k, -1.5, 0, .2, 0, 0, 0);
 		double mirrored = look(&t, k, 1.7, 0, .2, 4, 0, 0);
-		assert_true(fabs(mirrored - straight) < 2e-5 * straight);
+		assert_near(mirrored, straight, 2e-5 * straight);
 		double direct = k == VIEW_MESH ? .2 : 5 * PI * half;
 		if (k != VIEW_GATHER)
-			assert_true(fabs(straight - .6 / PI * (direct + .8)) < 1e-6);
+			assert_near(straight, .6 / PI * (direct + .8), 1e-6);
 	}
 	stage_free(&t);
 }
@@ -191,7 +191,8 @@ static void test_no_caustic_twice(void **state)
 	stage_end(&t, 0, .3, 0);
 	double direct = look(&t, VIEW_DIRECT, -1.5, 0, .2, 0, 0, 0);
 	double gathered = look(&t, VIEW_GATHER, -1.5, 0, .2, 0, 0, 0);
-	assert_true(direct > .6 / PI * .3 && gathered == direct);
+	assert_that(direct, >, .6 / PI * .3);
+	assert_that(gathered, ==, direct);
 	stage_free(&t);
 }
 
@@ -218,7 +219,7 @@ static void test_gathered(void **state)
 	for (double x = -1.8; x < 2; x += .31) {
 		double factor = .5 * (1 - (2 - x) / hypot(2 - x, 50));
 		double got = look(&t, VIEW_GATHER, x - .1, .3, 1, x, .3, 0);
-		assert_true(fabs(got - .5 / PI * factor) < .02 * .5 / PI * factor);
+		assert_near(got, .5 / PI * factor, .02 * .5 / PI * factor);
 	}
 	stage_free(&t);
 }
@@ -248,16 +249,18 @@ static void test_target(void **state)
 	assert_int_equal(view_render(v, &f, &o, NULL, &b, &all, &e), 0);
 	o.relative = .1;
 	assert_int_equal(view_render(v, &f, &o, NULL, &a, &some, &e), 0);
-	assert_true(some.rays < all.rays / 4 && some.rays >= 4 * PIXELS);
+	assert_that(some.rays, <, all.rays / 4);
+	assert_that(some.rays, >=, 4 * PIXELS);
 	double off = 0, stated = 0;
 	for (size_t i = 0; i < PIXELS; i++) {
 		double d = (double)(picture_image_plane(&a, 0)[i] - picture_image_plane(&b, 0)[i]);
 		double s = (double)picture_image_plane(&a, 3)[i];
 		off += d * d;
 		stated += s * s;
-		assert_true(s >= 0);
+		assert_that(s, >=, 0);
 	}
-	assert_true(stated > off / 9 && stated < off * 9);
+	assert_that(stated, >, off / 9);
+	assert_that(stated, <, off * 9);
 	picture_image_free(&a);
 	picture_image_free(&b);
 	view_scene_free(v);

@@ -1,14 +1,9 @@
 /* Images of punctual lights in plane mirrors, against closed forms. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "lib/base/vec3.h"
 #include "lib/ray/light_visibility.h"
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/grid.h"
 
 enum { FLOOR, MIRROR, PANE, MATERIALS };
@@ -85,12 +80,6 @@ static double irradiance(const struct room *r, double x, double y)
 	return sum;
 }
 
-static void near(double got, double want, double bound)
-{
-	if (!(fabs(got - want) <= bound))
-		fail_msg("%.12g for %.12g", got, want);
-}
-
 /* Of a point light at height h over the floor, a distance away. */
 static double from_point(double dx, double dy, double h)
 {
@@ -121,7 +110,7 @@ static void corner(void **state)
 			double want = from_point(x - 1, y - 2, 1) +
 			              rho * (from_point(x + 1, y - 2, 1) + from_point(x - 1, y + 2, 1)) +
 			              rho * rho * from_point(x + 1, y + 2, 1);
-			near(irradiance(&r, x, y), want, 1e-6 * want);
+			assert_near(irradiance(&r, x, y), want, 1e-6 * want);
 		}
 	room_free(&r);
 }
@@ -142,8 +131,8 @@ static void through_a_pane(void **state)
 	double cosine = 2 / sqrt(5);
 	/* Down to 1 m above the floor the mirror is behind the pane: its light crosses that
 	 * before it and behind it, and lands within half a metre. */
-	near(irradiance(&r, .25, 1), cosine * (1 + rho * tau * tau), 1e-6);
-	near(irradiance(&r, 1, 1), cosine * (1 + rho), 1e-6);
+	assert_near(irradiance(&r, .25, 1), cosine * (1 + rho * tau * tau), 1e-6);
+	assert_near(irradiance(&r, 1, 1), cosine * (1 + rho), 1e-6);
 	room_free(&r);
 }
 
@@ -165,7 +154,7 @@ static void facing(void **state)
 		want += pow(rho, abs(2 * i)) * from_point(.6 - (2 * i + .25), .5, 1) +
 		        pow(rho, abs(2 * i - 1)) * from_point(.6 - (2 * i - .25), .5, 1);
 	assert_false(r.ways.images.complete);
-	near(got, want, 1e-4 * want);
+	assert_near(got, want, 1e-4 * want);
 	room_free(&r);
 }
 

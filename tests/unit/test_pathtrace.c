@@ -4,15 +4,10 @@
  * are fixed. Sources: closed cavities and flux networks, view factors of parallel
  * squares (Howell's catalogue C-11, C-13). */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "lib/reference/pathtrace.h"
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/grid.h"
 
 static const double pi = 3.14159265358979323846;
@@ -118,7 +113,8 @@ static void check_patch(const struct scene *s, const struct pathtrace_irradiance
 	double error, mean = patch_mean(s, h, patch, side, band, &error);
 
 	check("irradiance", mean, expected, error, 0);
-	assert_true(error > 0 && error < .03 * expected);
+	assert_that(error, >, 0);
+	assert_that(error, <, .03 * expected);
 }
 
 /* A small picture from eye to target, optionally orthographic. */
@@ -170,7 +166,7 @@ static void check_picture(const struct scene *s, const double eye[3], const doub
 	take_picture(s, eye, target, half_extent, samples, &im);
 	mean = picture_mean(&im, "R", &error);
 	check("picture", mean, expected, error, relative);
-	assert_true(error < .05 * expected + 1e-30);
+	assert_that(error, <, .05 * expected + 1e-30);
 	picture_image_free(&im);
 }
 
@@ -200,15 +196,16 @@ static void test_furnace(void **state)
 		for (int b = 0; b < 3; b++)
 			check_patch(&s, &h, patch, FRONT, b, 1 / (1 - rho[b]));
 	for (int b = 0; b < 3; b++) {
-		assert_true(fabs(h.emitted[b] - 6) < 1e-12 && h.escaped[b] == 0);
+		assert_near(h.emitted[b], 6, 1e-12);
+		assert_that(h.escaped[b], ==, 0);
 		for (size_t e = 0; e < s.m.element.n; e++)
-			assert_true(h.h[(2 * e + BACK) * 3 + (size_t)b] == 0);
+			assert_that(h.h[(2 * e + BACK) * 3 + (size_t)b], ==, 0);
 	}
 	take_picture(&s, inside, corner, 0, 64, &im);
 	for (int b = 0; b < 3; b++) {
 		double mean = picture_mean(&im, name[b], &error);
 		check(name[b], mean, 1 / (1 - rho[b]) / pi, error, 0);
-		assert_true(error < .02 * mean);
+		assert_that(error, <, .02 * mean);
 	}
 	picture_image_free(&im);
 	pathtrace_irradiance_free(&h);
@@ -263,12 +260,12 @@ static void test_isolated(void **state)
 		check_patch(&s, &h, patch, FRONT, 0, 2);
 	for (size_t e = 0; e < s.m.element.n; e++) {
 		double one = h.emitted[0] / 200000 / s.m.element.area[e];
-		assert_true(h.h[2 * e + BACK] == 0);
-		assert_true(fabs(h.error[2 * e + BACK] / one - 1) < 1e-12);
+		assert_that(h.h[2 * e + BACK], ==, 0);
+		assert_near(h.error[2 * e + BACK] / one, 1, 1e-12);
 		if (e < s.m.patch.start[6])
-			assert_true(h.h[2 * e] == 0);
+			assert_that(h.h[2 * e], ==, 0);
 	}
-	assert_true(h.escaped[0] == 0);
+	assert_that(h.escaped[0], ==, 0);
 	pathtrace_irradiance_free(&h);
 	done(&s);
 }
@@ -452,7 +449,7 @@ static void test_reciprocal_both_ways(void **state)
 	take_picture(&s, (double[]){ 1.5, .5, .5 }, (double[]){ 1.5, .5, 0 }, .5, 400, &im);
 	eye = picture_mean(&im, "R", &spread);
 	check("both ways", eye, light, hypot(spread, .6 / pi * error), 0);
-	assert_true(spread < .02 * eye);
+	assert_that(spread, <, .02 * eye);
 	picture_image_free(&im);
 	pathtrace_irradiance_free(&h);
 	done(&s);
@@ -549,7 +546,8 @@ static void test_standard_error(void **state)
 		pathtrace_irradiance_free(&h);
 	}
 	double variance = (squares - sum * sum / RUNS) / (RUNS - 1);
-	assert_true(variance > .2 * said && variance < 2.5 * said);
+	assert_that(variance, >, .2 * said);
+	assert_that(variance, <, 2.5 * said);
 	done(&s);
 }
 
@@ -573,7 +571,8 @@ static void test_threads(void **state)
 		assert_int_equal(pathtrace_particles(s.p, &o, NULL, &h[i], &e), 0);
 		o.samples = 5;
 		assert_int_equal(pathtrace_picture(s.p, &f, &o, NULL, &im[i], &relative, &e), 0);
-		assert_true(relative > 0 && isfinite(relative));
+		assert_that(relative, >, 0);
+		assert_true(isfinite(relative));
 	}
 	size_t rows = 2 * s.m.element.n;
 	assert_memory_equal(h[0].h, h[1].h, rows * sizeof(double));

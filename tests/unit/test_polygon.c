@@ -1,23 +1,12 @@
 /* Facets, their form factors by contour and by cubature: against closed forms. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "lib/geometry/contour.h"
 #include "lib/geometry/exchange_unoccluded.h"
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/polygon_scene.h"
 
 static const double pi = 3.14159265358979323846;
-
-static void assert_near(double got, double expected, double tolerance)
-{
-	if (!(fabs(got - expected) <= tolerance))
-		fail_msg("got %.17g, expected %.17g within %.2g", got, expected, tolerance);
-}
 
 static struct facet facet_of(int n, const double *v)
 {
@@ -347,7 +336,7 @@ static void test_joint(void **state)
 		double exact = geo_cubature_exchange(&f, &p, &g, &q);
 		assert_near(geo_pair_exchange(&f, &jf, &g, &jg), exact, (tol + 1e-13) * exact);
 	}
-	assert_true(used > 1000);
+	assert_that(used, >, 1000);
 }
 
 /* Four pairs at a time: as one by one, the same bits whichever facet of a pair is given. */
@@ -389,7 +378,7 @@ static void test_joint_table(void **state)
 				            v3_dot(f[j].normal, f[i].centre) - f[j].offset < f[i].radius);
 				continue;
 			}
-			assert_true(x[0] == other[0]);
+			assert_that(x[0], ==, other[0]);
 			if (x[0] > 0) {
 				double exact = geo_pair_exchange(&f[i], &joint[i], &f[j], &joint[j]);
 				assert_true(front);
@@ -400,10 +389,11 @@ static void test_joint_table(void **state)
 			geo_facet_heights(&f[j], f[i].normal, f[i].offset, &low, &high);
 			if (high > near)
 				geo_facet_heights(&f[i], f[j].normal, f[j].offset, &low, &high);
-			assert_true(high <= near);
+			assert_that(high, <=, near);
 			behind++;
 		}
-	assert_true(reached > 100 && behind > 100);
+	assert_that(reached, >, 100);
+	assert_that(behind, >, 100);
 	geo_pair_table_free(&t);
 }
 
@@ -446,8 +436,8 @@ static void assert_plane(const struct facet *part, const struct facet *whole)
 	for (int i = 0; i < part->n; i++)
 		assert_near(v3_dot(whole->normal, &part->v[3 * i]), whole->offset, 1e-15);
 	for (int k = 0; k < 3; k++)
-		assert_true(part->normal[k] == whole->normal[k]);
-	assert_true(part->offset == whole->offset);
+		assert_that(part->normal[k], ==, whole->normal[k]);
+	assert_that(part->offset, ==, whole->offset);
 }
 
 static void test_facet_parts(void **state)
@@ -495,7 +485,7 @@ static void test_facet_clip(void **state)
 	assert_near(out.f.area, .75, 1e-16);
 	assert_int_equal(out.f.n, 4);
 	assert_true(geo_facet_clip(&f, x, 0, &out));
-	assert_true(out.f.area == 1);
+	assert_that(out.f.area, ==, 1);
 	assert_false(geo_facet_clip(&f, x, 1, &out));
 	assert_false(geo_facet_clip(&f, x, 2, &out));
 	assert_true(geo_facet_clip(&f, x, .5, &out));

@@ -1,17 +1,12 @@
 /* Form factors and the solver against closed forms, in memory. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include <unistd.h>
 
 #include "formats/cache/ff_file.h"
 #include "lib/radiosity/shoot.h"
 #include "lib/scatter/bsdf.h"
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/grid.h"
 #include "tests/unit/fixtures/solved.h"
 
@@ -41,7 +36,7 @@ static void solve(const struct model *m, const struct ff_options *o, const uint3
 
 	solved_begin(&x, m, o, 0);
 	solved_finish(&x, 1e-9);
-	assert_true(x.r.residual <= 1e-13);
+	assert_that(x.r.residual, <=, 1e-13);
 	for (size_t k = 0; k < n; k++)
 		h[k] = patch_mean(m, &x.s, side[k], 0);
 	solved_free(&x);
@@ -60,7 +55,7 @@ static void furnace(const struct ff_options *o, double tolerance)
 	grid_end(&m);
 	solve(&m, o, side, 6, h);
 	for (int k = 0; k < 6; k++)
-		assert_true(fabs(h[k] - 2) < tolerance);
+		assert_near(h[k], 2, tolerance);
 	model_free(&m);
 }
 
@@ -128,7 +123,7 @@ static void plates(const struct ff_options *o, double lobe_exponent, double tole
 	for (int k = 0; k < 4; k++) {
 		if (!(fabs(h[k] / expected[k] - 1) < tolerance))
 			print_error("exponent %g: %g for %g\n", lobe_exponent, h[k], expected[k]);
-		assert_true(fabs(h[k] / expected[k] - 1) < tolerance);
+		assert_near(h[k] / expected[k], 1, tolerance);
 	}
 	model_free(&m);
 }
@@ -163,8 +158,8 @@ static void six_bands(void **state)
 		for (int k = 1; k < 6; k++) {
 			double h = (k + 1) * solution_irradiance(&x.s, i, 0);
 			double e = (k + 1) * x.s.error.sampling[6 * i];
-			assert_true(fabs(solution_irradiance(&x.s, i, k) - h) <= 1e-12 * h);
-			assert_true(fabs(x.s.error.sampling[6 * i + (size_t)k] - e) <= 1e-5 * e);
+			assert_near(solution_irradiance(&x.s, i, k), h, 1e-12 * h);
+			assert_near(x.s.error.sampling[6 * i + (size_t)k], e, 1e-5 * e);
 		}
 	solved_free(&x);
 	model_free(&m);
@@ -192,7 +187,7 @@ static void solve_file(const struct model *m, const struct ff *f, int to_patches
 	struct err e = { 0 };
 	int fd = mkstemp(path);
 
-	assert_true(fd >= 0);
+	assert_that(fd, >=, 0);
 	close(fd);
 	struct ff_writer *w = file_ff_create(path, m, f->value64 != NULL, to_patches, &e);
 	if (!w || file_ff_append(w, f, &e) || file_ff_finish(w, f, &info, &e) ||
@@ -224,10 +219,12 @@ static void patches_as_receivers(const struct ff_options *o, double exponent, do
 	for (size_t i = 0; i < 2 * m.element.n; i++) {
 		uint32_t ps = 2 * m.element.patch[i >> 1] + (uint32_t)(i & 1);
 		double h = solution_irradiance(&patches, i, 0);
-		assert_true(solution_irradiance(&memory, i, 0) == solution_irradiance(&elements, i, 0));
-		assert_true(memory.error.sampling[i] == elements.error.sampling[i]);
-		assert_true(fabs(h - patch_mean(&m, &elements, ps, 0)) <= tolerance * h);
-		assert_true(h == solution_irradiance(&patches, 2 * m.patch.start[ps >> 1] + (i & 1), 0));
+		assert_that(solution_irradiance(&memory, i, 0), ==,
+		            solution_irradiance(&elements, i, 0));
+		assert_that(memory.error.sampling[i], ==, elements.error.sampling[i]);
+		assert_near(h, patch_mean(&m, &elements, ps, 0), tolerance * h);
+		assert_that(h, ==,
+		            solution_irradiance(&patches, 2 * m.patch.start[ps >> 1] + (i & 1), 0));
 	}
 	solution_free(&memory);
 	solution_free(&elements);
@@ -304,12 +301,12 @@ static void white_furnace(double rho, double passes)
 	solved_begin(&x, &m, &rays, 0);
 	solved_finish(&x, 1e-8);
 	double absorbed = (1 - rho) * x.s.ledger[0] * exact;
-	assert_true(fabs(x.s.ledger[LEDGER_ABSORBED] / absorbed - 1) < x.r.bound);
-	assert_true(x.r.bound < 1e-7 * exact);
-	assert_true(x.r.passes <= passes);
-	assert_true(x.r.residual <= 1e-13);
+	assert_near(x.s.ledger[LEDGER_ABSORBED] / absorbed, 1, x.r.bound);
+	assert_that(x.r.bound, <, 1e-7 * exact);
+	assert_that(x.r.passes, <=, passes);
+	assert_that(x.r.residual, <=, 1e-13);
 	for (uint32_t p = 0; p < m.patch.n; p++)
-		assert_true(fabs(patch_mean(&m, &x.s, 2 * p, 0) / exact - 1) < .05);
+		assert_near(patch_mean(&m, &x.s, 2 * p, 0) / exact, 1, .05);
 	solved_free(&x);
 	model_free(&m);
 }
@@ -342,9 +339,9 @@ static void bound_is_sharp(void **state)
 			arrived[k] += m.element.area[i] * solution_irradiance(&x.s, 2 * i, 0);
 	}
 	double missing = (arrived[1] - arrived[0]) / x.s.ledger[LEDGER_EMITTED];
-	assert_true(missing > .1);
-	assert_true(missing <= bound * (1 + 1e-9));
-	assert_true(bound <= 1.1 * missing);
+	assert_that(missing, >, .1);
+	assert_that(missing, <=, bound * (1 + 1e-9));
+	assert_that(bound, <=, 1.1 * missing);
 	solved_free(&x);
 	model_free(&m);
 }
@@ -359,10 +356,10 @@ static void shoot_all(struct shooter *v)
 			radiosity_shoot_side(v, ps, 0);
 		radiosity_survey(v, &worst);
 	}
-	assert_true(worst <= 1e-13);
+	assert_that(worst, <=, 1e-13);
 }
 
-static void assert_near(const double *a, const double *b, size_t n)
+static void assert_same(const double *a, const double *b, size_t n)
 {
 	double most = 0, off = 0;
 
@@ -370,7 +367,7 @@ static void assert_near(const double *a, const double *b, size_t n)
 		most = fmax(most, fabs(a[i]));
 		off = fmax(off, fabs(a[i] - b[i]));
 	}
-	assert_true(off <= 1e-10 * most);
+	assert_that(off, <=, 1e-10 * most);
 }
 
 /* Overshooting comes to what shots come to, in each of the three parts: mirrors, lobes,
@@ -394,19 +391,19 @@ static void overshooting(double exponent, int bands)
 		if (k == 0)
 			shoot_all(&v);
 		for (int i = 0; k == 1 && i < 3; i++)
-			assert_true(radiosity_gmres_finish(&v, 1, 1e-13, &x.e) >= 0);
+			assert_that(radiosity_gmres_finish(&v, 1, 1e-13, &x.e), >=, 0);
 		radiosity_survey(&v, &worst);
-		assert_true(worst <= 1e-12);
-		assert_true(v.residual <= 1e-13);
+		assert_that(worst, <=, 1e-12);
+		assert_that(v.residual, <=, 1e-13);
 		radiosity_propagator_store(&v.sender, &x.s);
 		radiosity_shooter_free(&v);
 		solved_gather(&x);
 		s[k] = x.s;
 	}
 	size_t n = s[0].element_sides * (size_t)bands;
-	assert_near(s[0].irradiance.direct, s[1].irradiance.direct, n);
-	assert_near(s[0].irradiance.caustic, s[1].irradiance.caustic, n);
-	assert_near(s[0].irradiance.indirect, s[1].irradiance.indirect, n);
+	assert_same(s[0].irradiance.direct, s[1].irradiance.direct, n);
+	assert_same(s[0].irradiance.caustic, s[1].irradiance.caustic, n);
+	assert_same(s[0].irradiance.indirect, s[1].irradiance.indirect, n);
 	solution_free(&s[0]);
 	solved_free(&x);
 	model_free(&m);

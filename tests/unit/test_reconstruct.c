@@ -67,7 +67,7 @@ static void test_constant(void **state)
 		grid_solution(&m, .1, &s);
 		run(&m, &s, 1, &r);
 		for (size_t i = 0; i < 18 * m.element.n; i++)
-			assert_true(r.corner[i] == (float).1);
+			assert_that(r.corner[i], ==, (float).1);
 		interp_reconstruction_free(&r);
 		grid_solution_free(&s);
 		model_free(&m);
@@ -88,7 +88,7 @@ static void test_linear(void **state)
 		grid_solution(&m, 0, &s);
 		fill(&m, &s, linear);
 		run(&m, &s, 1, &r); /* borders and corners included */
-		assert_true(worst(&m, &r, linear) < 1e-6);
+		assert_that(worst(&m, &r, linear), <, 1e-6);
 		interp_reconstruction_free(&r);
 		grid_solution_free(&s);
 		model_free(&m);
@@ -115,7 +115,7 @@ static void test_linear_irregular(void **state)
 	grid_solution(&m, 0, &s);
 	fill(&m, &s, linear);
 	run(&m, &s, 1, &r);
-	assert_true(worst(&m, &r, linear) < 1e-6);
+	assert_that(worst(&m, &r, linear), <, 1e-6);
 	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);
@@ -139,7 +139,7 @@ static void test_never_negative(void **state)
 	grid_solution(&m, 0, &s);
 	fill(&m, &s, ramp_from_zero);
 	run(&m, &s, 1, &r);
-	assert_true(worst(&m, &r, ramp_from_zero) < 1e-6);
+	assert_that(worst(&m, &r, ramp_from_zero), <, 1e-6);
 	interp_reconstruction_free(&r);
 	/* A lit strip beside darkness: no undershoot, no overshoot, no NaN. */
 	for (size_t e = 0; e < m.element.n; e++)
@@ -148,11 +148,12 @@ static void test_never_negative(void **state)
 	for (size_t c = 0; c < 3 * m.element.n; c++) {
 		double v = corner(&r, c / 3, c % 3);
 		double x = m.vertex[3 * (size_t)m.element.corner[c]];
-		assert_true(v >= 0 && v <= 1);
+		assert_that(v, >=, 0);
+		assert_that(v, <=, 1);
 		if (x < .49)
-			assert_true(v == 0);
+			assert_that(v, ==, 0);
 		if (x > .51)
-			assert_true(v > .999999);
+			assert_that(v, >, .999999);
 	}
 	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
@@ -191,9 +192,9 @@ static double fold_jump(double degrees)
 static void test_crease(void **state)
 {
 	(void)state;
-	assert_true(fold_jump(40) < 1e-6);  /* a break: both sides keep their value */
-	assert_true(fold_jump(-40) < 1e-6);
-	assert_true(fold_jump(20) > .3);    /* smooth: the edge is shared */
+	assert_that(fold_jump(40), <, 1e-6);  /* a break: both sides keep their value */
+	assert_that(fold_jump(-40), <, 1e-6);
+	assert_that(fold_jump(20), >, .3);    /* smooth: the edge is shared */
 }
 
 static void test_surfaces_and_rooms(void **state)
@@ -217,7 +218,7 @@ static void test_surfaces_and_rooms(void **state)
 		s.irradiance.indirect[2 * e] = 5;
 	run(&m, &s, 1, &r);
 	for (size_t c = 0; c < 3 * m.element.n; c++) /* the dark room stays dark */
-		assert_true(corner(&r, c / 3, c % 3) == (c / 3 < m.element.n / 2 ? 5 : 0));
+		assert_that(corner(&r, c / 3, c % 3), ==, (c / 3 < m.element.n / 2 ? 5 : 0));
 	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);
@@ -255,8 +256,8 @@ static void test_noise(void **state)
 		}
 		interp_reconstruction_free(&r);
 	}
-	assert_true(after[0] < .25 * before);
-	assert_true(after[1] < .5 * after[0]);
+	assert_that(after[0], <, .25 * before);
+	assert_that(after[1], <, .5 * after[0]);
 	grid_solution_free(&s);
 	model_free(&m);
 }
@@ -291,7 +292,7 @@ static void test_mean(void **state)
 		before += s.irradiance.indirect[2 * e];
 		after += (corner(&r, e, 0) + corner(&r, e, 1) + corner(&r, e, 2)) / 3;
 	}
-	assert_true(fabs(after / before - 1) < 5e-4);
+	assert_near(after / before, 1, 5e-4);
 	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);
@@ -346,7 +347,7 @@ static void test_fan(void **state)
 	grid_solution(&m, 3, &s);
 	run(&m, &s, 1, &r);
 	for (size_t i = 0; i < 6 * m.element.n; i++)
-		assert_true(fabs((double)r.corner[i] - 3) < 1e-6);
+		assert_near((double)r.corner[i], 3, 1e-6);
 	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);

@@ -1,10 +1,5 @@
 /* Refinement: what is divided, that it stays conforming, what stays as it was. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/grid.h"
 #include "tests/unit/fixtures/shapes.h"
 
@@ -116,12 +111,12 @@ static void check_origins(const struct refined *f)
 
 	for (size_t i = 0; i < f->m.element.n; i++) {
 		uint32_t o = f->origin[i];
-		assert_true(o < f->old.element.n);
+		assert_that(o, <, f->old.element.n);
 		assert_int_equal(f->m.element.triangle[i], f->old.element.triangle[o]);
 		area[o] += f->m.element.area[i];
 	}
 	for (size_t o = 0; o < f->old.element.n; o++)
-		assert_true(fabs(area[o] - f->old.element.area[o]) < 1e-12);
+		assert_near(area[o], f->old.element.area[o], 1e-12);
 	free(area);
 }
 
@@ -131,16 +126,18 @@ static void test_conforming(void **state)
 
 	(void)state;
 	refine(&f, make_cube, .25, (double[]){ .3, .4, 1 }, .1);
-	assert_true(f.r.marked > 0 && f.m.element.n > f.old.element.n);
+	assert_that(f.r.marked, >, 0);
+	assert_that(f.m.element.n, >, f.old.element.n);
 	check_origins(&f);
 	for (size_t e = 0; e < f.m.element.n; e++) {
 		uint32_t o = f.origin[e];
 		double l = longest(&f.m, e);
-		assert_true(l <= longest(&f.old, o) && l > how.smallest.value * .999);
+		assert_that(l, <=, longest(&f.old, o));
+		assert_that(l, >, how.smallest.value * .999);
 		if (f.s.error.discretisation[2 * o] > 0) /* three times, which leaves .35 of the energy */
-			assert_true(l < .36 * longest(&f.old, o));
+			assert_that(l, <, .36 * longest(&f.old, o));
 		/* Bisected right triangles stay right and isosceles. */
-		assert_true(f.m.element.area[e] > .249 * l * l);
+		assert_that(f.m.element.area[e], >, .249 * l * l);
 	}
 	release(&f);
 }
@@ -160,12 +157,12 @@ static void test_elsewhere(void **state)
 		v3_sub(c, at, c);
 		if (v3_length(c) < .5)
 			continue;
-		assert_true(f.m.element.area[e] == f.old.element.area[f.origin[e]]);
-		assert_true(fabs(f.m.patch.area[f.m.element.patch[e]] -
-		                 f.old.patch.area[f.old.element.patch[f.origin[e]]]) < 1e-15);
+		assert_that(f.m.element.area[e], ==, f.old.element.area[f.origin[e]]);
+		assert_near(f.m.patch.area[f.m.element.patch[e]],
+		            f.old.patch.area[f.old.element.patch[f.origin[e]]], 1e-15);
 		same++;
 	}
-	assert_true(same > f.old.element.n / 2);
+	assert_that(same, >, f.old.element.n / 2);
 	release(&f);
 }
 
@@ -203,7 +200,7 @@ static void test_out_of_reach(void **state)
 		near += f.s.error.discretisation[i] > .1;
 	assert_int_equal(refine_once(&f, &o, &one), 0);
 	assert_int_equal(f.r.marked, near);
-	assert_true(f.r.error_expected > one.error);
+	assert_that(f.r.error_expected, >, one.error);
 	release(&f);
 }
 
@@ -218,7 +215,9 @@ static void test_patches(void **state)
 	prepare(&f, make_room, o);
 	make_uneven(&f, .4, 0);
 	assert_int_equal(refine_once(&f, &o, &how), 0);
-	assert_true(f.r.patches_marked > 0 && f.r.marked == 0 && f.m.patch.n > f.old.patch.n);
+	assert_that(f.r.patches_marked, >, 0);
+	assert_that(f.r.marked, ==, 0);
+	assert_that(f.m.patch.n, >, f.old.patch.n);
 	for (uint32_t p = 0; p < f.m.patch.n; p++) {
 		int border = 0;
 		for (size_t i = 3 * (size_t)f.m.patch.start[p];

@@ -1,16 +1,11 @@
 /* Directions within a triangle: its solid angle, and moments of the samples against it and
  * against Lambert's formula. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
 #include "lib/geometry/solid_angle.h"
+#include "tests/unit/fixtures/check.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -42,7 +37,7 @@ static void octant(void **state)
 {
 	const double v[] = { 3, 0, 0, 0, 1, 0, 0, 0, 2 }, x[3] = { 0 };
 	(void)state;
-	assert_true(fabs(geo_solid_angle(v, x) - pi / 2) < 1e-14);
+	assert_near(geo_solid_angle(v, x), pi / 2, 1e-14);
 }
 
 static void samples(void **state)
@@ -58,14 +53,14 @@ static void samples(void **state)
 		for (uint32_t i = 0; i < N; i++) {
 			double u[2] = { rng_sobol(i, 0, 1), rng_sobol(i, 1, 1) }, dir[3];
 			geo_solid_angle_sample(v[0], x, angle, u, dir);
-			assert_true(fabs(v3_length(dir) - 1) < 1e-12);
+			assert_near(v3_length(dir), 1, 1e-12);
 			/* It is within: on the same side of all planes through edges. */
 			for (int k = 0; k < 3; k++) {
 				double edge[3];
 				v3_cross(v[k], v[(k + 1) % 3], edge);
 				double side = v3_dot(edge, v[(k + 2) % 3]);
 				double off = v3_dot(edge, dir) / v3_length(edge);
-				assert_true(off * side >= -1e-9 * fabs(side));
+				assert_that(off * side, >=, -1e-9 * fabs(side));
 			}
 			v3_mad(sum, angle / N, dir, sum);
 		}
@@ -74,7 +69,7 @@ static void samples(void **state)
 			for (int k = 0; k < 3; k++)
 				want[k] = -want[k];
 		v3_sub(sum, want, sum);
-		assert_true(v3_length(sum) < 1e-4 * v3_length(want));
+		assert_that(v3_length(sum), <, 1e-4 * v3_length(want));
 	}
 }
 

@@ -1,10 +1,5 @@
 /* Exposure, the display curve, false colours and their legend. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
 
 #include <png.h>
 #include <stdio.h>
@@ -14,6 +9,7 @@
 
 #include "formats/picture/png_file.h"
 #include "lib/picture/tonemap.h"
+#include "tests/unit/fixtures/check.h"
 
 static const char *const names[] = { "R", "G", "B" };
 static const int rgb[3] = { 0, 1, 2 };
@@ -33,12 +29,6 @@ static void set_grey(struct image *im, int at, float value)
 		picture_image_plane(im, c)[at] = value;
 }
 
-static void near(double got, double expected, double tolerance)
-{
-	if (!(fabs(got - expected) <= tolerance))
-		fail_msg("%.9g is not %.9g", got, expected);
-}
-
 static void test_black(void **state)
 {
 	struct image im;
@@ -49,20 +39,20 @@ static void test_black(void **state)
 
 	(void)state;
 	grey_image(&im, 8, 8, 0);
-	assert_true(picture_tonemap_exposure(&im, rgb, &lit) == 0);
+	assert_that(picture_tonemap_exposure(&im, rgb, &lit), ==, 0);
 	assert_int_equal(lit, 0);
 	assert_int_equal(picture_canvas_new(&c, 8, 8, &e), 0);
 	for (curve.compress = 0; curve.compress < 2; curve.compress++) {
 		assert_int_equal(picture_tonemap_curve(&im, rgb, &curve, &c), 0);
 		for (int i = 0; i < 3 * 64; i++)
-			assert_true(c.rgb[i] == 0);
+			assert_that(c.rgb[i], ==, 0);
 	}
 	for (int logarithmic = 0; logarithmic < 2; logarithmic++) {
 		struct tone_scale s = { NAN, NAN, logarithmic };
 
 		assert_int_equal(picture_tonemap_scale(&im, rgb, &s, &e), 0);
-		near(s.min, logarithmic ? .01 : 0, 1e-15);
-		near(s.max, 1, 0);
+		assert_near(s.min, logarithmic ? .01 : 0, 1e-15);
+		assert_near(s.max, 1, 0);
 		assert_int_equal(picture_tonemap_false_colour(&im, rgb, &s, &c), 0);
 	}
 	picture_canvas_free(&c);
@@ -78,7 +68,7 @@ static void test_exposure(void **state)
 	(void)state;
 	for (size_t i = 0; i < sizeof levels / sizeof *levels; i++) {
 		grey_image(&im, 10, 10, levels[i]);
-		near(picture_tonemap_exposure(&im, rgb, &lit), log2(.18 / levels[i]), .01);
+		assert_near(picture_tonemap_exposure(&im, rgb, &lit), log2(.18 / levels[i]), .01);
 		/* Lamps, black and broken pixels do not matter. */
 		set_grey(&im, 0, 3e38f);
 		set_grey(&im, 1, 3e38f);
@@ -86,7 +76,7 @@ static void test_exposure(void **state)
 			set_grey(&im, k, 0);
 		set_grey(&im, 2, NAN);
 		set_grey(&im, 3, -1);
-		near(picture_tonemap_exposure(&im, rgb, &lit), log2(.18 / levels[i]), .01);
+		assert_near(picture_tonemap_exposure(&im, rgb, &lit), log2(.18 / levels[i]), .01);
 		assert_int_equal(lit, 58);
 		picture_image_free(&im);
 	}
@@ -109,13 +99,15 @@ static void test_curve(void **state)
 	picture_image_plane(&im, 1)[4] = INFINITY;
 	assert_int_equal(picture_canvas_new(&c, 5, 1, &e), 0);
 	assert_int_equal(picture_tonemap_curve(&im, rgb, &curve, &c), 1);
-	near(c.rgb[0], 1.055 * pow(.5, 1 / 2.4) - .055, 1e-6);
-	near(c.rgb[3], .002 * 12.92, 1e-6);
+	assert_near(c.rgb[0], 1.055 * pow(.5, 1 / 2.4) - .055, 1e-6);
+	assert_near(c.rgb[3], .002 * 12.92, 1e-6);
 	picture_canvas_quantise(&c, 8, bytes);
 	assert_int_equal(bytes[0], 188); /* the sRGB code of one half */
 	assert_int_equal(bytes[6], 255);
 	assert_int_equal(bytes[9], 0);
-	assert_true(bytes[12] == 255 && bytes[13] == 0 && bytes[14] == 255);
+	assert_that(bytes[12], ==, 255);
+	assert_that(bytes[13], ==, 0);
+	assert_that(bytes[14], ==, 255);
 	picture_canvas_quantise(&c, 16, words);
 	assert_int_equal(words[6], 65535);
 
@@ -123,8 +115,8 @@ static void test_curve(void **state)
 	curve = (struct tone_curve){ .exposure = 1, .white = 4, .compress = 1 };
 	set_grey(&im, 2, 2);
 	assert_int_equal(picture_tonemap_curve(&im, rgb, &curve, &c), 1);
-	near(c.rgb[0], 1.055 * pow(.34375, 1 / 2.4) - .055, 1e-6);
-	near(c.rgb[6], 1, 1e-6);
+	assert_near(c.rgb[0], 1.055 * pow(.34375, 1 / 2.4) - .055, 1e-6);
+	assert_near(c.rgb[6], 1, 1e-6);
 	picture_canvas_free(&c);
 	picture_image_free(&im);
 }
@@ -140,15 +132,15 @@ static void test_colours(void **state)
 		double l = .299 * (double)c[0] + .587 * (double)c[1] + .114 * (double)c[2];
 		for (int k = 0; k < 3; k++)
 			assert_true(c[k] >= 0 && c[k] <= 1);
-		assert_true(l > before - 1e-3);
+		assert_that(l, >, before - 1e-3);
 		/* far from the magenta of broken pixels */
-		assert_true(fabsf(c[0] - 1) + c[1] + fabsf(c[2] - 1) > .5f);
+		assert_that(fabsf(c[0] - 1) + c[1] + fabsf(c[2] - 1), >, .5f);
 		before = l;
 	}
 	picture_tonemap_colour(0, c);
-	near((double)(c[0] + c[1] + c[2]), 0, 1e-6);
+	assert_near((double)(c[0] + c[1] + c[2]), 0, 1e-6);
 	picture_tonemap_colour(1, c);
-	near((double)(c[0] + c[1] + c[2]), 3, 1e-6);
+	assert_near((double)(c[0] + c[1] + c[2]), 3, 1e-6);
 }
 
 static void check_scale(float low, float high, int logarithmic, double min, double max)
@@ -162,10 +154,10 @@ static void check_scale(float low, float high, int logarithmic, double min, doub
 		set_grey(&im, i, low);
 	if (picture_tonemap_scale(&im, rgb, &s, &e))
 		fail_msg("%s", e.text);
-	near(s.min, min, 1e-9 * (fabs(min) + fabs(max)));
-	near(s.max, max, 1e-9 * (fabs(min) + fabs(max)));
-	assert_true(picture_tonemap_position(&s, s.min) == 0);
-	assert_true(picture_tonemap_position(&s, s.max) == 1);
+	assert_near(s.min, min, 1e-9 * (fabs(min) + fabs(max)));
+	assert_near(s.max, max, 1e-9 * (fabs(min) + fabs(max)));
+	assert_that(picture_tonemap_position(&s, s.min), ==, 0);
+	assert_that(picture_tonemap_position(&s, s.max), ==, 1);
 	picture_image_free(&im);
 }
 
@@ -185,8 +177,8 @@ static void test_scale(void **state)
 	check_scale(-.3f, -.2f, 0, -.5, 0);
 	grey_image(&im, 4, 4, 100);
 	assert_int_equal(picture_tonemap_scale(&im, rgb, &s, &e), 0);
-	near(s.min, .3, 1e-12);
-	near(picture_tonemap_position(&s, .3 * sqrt(10)), .5, 1e-12);
+	assert_near(s.min, .3, 1e-12);
+	assert_near(picture_tonemap_position(&s, .3 * sqrt(10)), .5, 1e-12);
 	set_grey(&im, 0, 1);
 	picture_image_free(&im);
 	grey_image(&im, 4, 4, 1);
@@ -206,23 +198,23 @@ static void check_legend(const struct tone_scale *s, int width, int height)
 	for (int i = 0; i < 3 * width * height; i++)
 		c.rgb[i] = .25f;
 	assert_int_equal(picture_legend_append(&c, s, &e), 0);
-	assert_true(c.width > old_width);
+	assert_that(c.width, >, old_width);
 	assert_int_equal(c.height, height < 40 ? 40 : height);
 	for (int x = 0; x < old_width; x++)
-		assert_true(c.rgb[3 * x] == .25f);
+		assert_that(c.rgb[3 * x], ==, .25f);
 	int dot = 1 + c.height / 500;
 	bar = old_width + 6 * dot + 6 * dot;
 	picture_tonemap_colour(1, top);
 	p = c.rgb + 3 * (6 * dot * c.width + bar);
 	for (int k = 0; k < 3; k++)
-		near((double)p[k], (double)top[k], 1e-6);
+		assert_near((double)p[k], (double)top[k], 1e-6);
 	for (int y = 0; y < c.height; y++)
 		for (int x = old_width + (6 + 12 + 6) * dot; x < c.width; x++)
 			white += c.rgb[3 * (y * c.width + x)] == 1;
-	assert_true(white > 20 * dot * dot);
+	assert_that(white, >, 20 * dot * dot);
 	/* The numbers end before the edge. */
 	for (int y = 0; y < c.height; y++)
-		assert_true(c.rgb[3 * (y * c.width + c.width - 1)] == 0);
+		assert_that(c.rgb[3 * (y * c.width + c.width - 1)], ==, 0);
 	picture_canvas_free(&c);
 }
 
@@ -252,7 +244,7 @@ static void test_png(void **state)
 	int fd = mkstemp(path);
 
 	(void)state;
-	assert_true(fd >= 0);
+	assert_that(fd, >=, 0);
 	close(fd);
 	assert_int_equal(file_png_write(path, 2, 2, 16, out, "caf\xc3\xa9", &e), 0);
 	assert_true(png_image_begin_read_from_file(&png, path));

@@ -1,15 +1,10 @@
 /* Patch matrices and the laws that --verify checks. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
 #include <float.h>
 
 #include "lib/audit/patch_matrix.h"
 #include "lib/audit/side_table.h"
 #include "lib/audit/verify.h"
+#include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/small_scene.h"
 
 static const uint8_t sides[] = { 3, 1 };
@@ -19,12 +14,6 @@ static struct ff_scene scene_of(const struct model *m)
 	return (struct ff_scene){ .patches = m->patch.n, .elements = m->element.n,
 		.materials = m->material.n, .patch_start = m->patch.start,
 		.patch_area = m->patch.area, .patch_sides = sides };
-}
-
-static void near(double got, double want)
-{
-	if (!(fabs(got - want) <= 1e-14))
-		fail_msg("%.17g instead of %.17g", got, want);
 }
 
 static void test_matrix(void **state)
@@ -44,10 +33,13 @@ static void test_matrix(void **state)
 	assert_int_equal(pm.sides, 3);
 	assert_int_equal(pm.unmodelled, 1);
 	ff_patch_matrix_row(&pm, 0, row, &black, &escape);
-	near(row[0], 0), near(row[1], .25), near(row[2], .25);
-	near(black, .125), near(escape, .375);
+	assert_near(row[0], 0, 1e-14);
+	assert_near(row[1], .25, 1e-14);
+	assert_near(row[2], .25, 1e-14);
+	assert_near(black, .125, 1e-14);
+	assert_near(escape, .375, 1e-14);
 	ff_patch_matrix_row(&pm, 2, row, &black, &escape); /* a scaled row */
-	near(row[0] + row[1] + row[2] + black + escape, 1);
+	assert_near(row[0] + row[1] + row[2] + black + escape, 1, 1e-14);
 	ff_patch_matrix_free(&pm);
 	f.row.kind[1] = FF_REFLECTED;
 	assert_int_equal(ff_patch_matrix_init(&pm, &f, &s, &e), 0);
@@ -89,7 +81,8 @@ static void test_matrix_of_patches(void **state)
 		ff_patch_matrix_row(&a, i, row[0], &black[0], &escape[0]);
 		ff_patch_matrix_row(&b, i, row[1], &black[1], &escape[1]);
 		assert_memory_equal(row[0], row[1], sizeof row[0]);
-		assert_true(black[0] == black[1] && escape[0] == escape[1]);
+		assert_that(black[0], ==, black[1]);
+		assert_that(escape[0], ==, escape[1]);
 	}
 	ff_patch_matrix_free(&a);
 	ff_patch_matrix_free(&b);
@@ -159,7 +152,7 @@ static void test_ledger(void **state)
 	small_model(&m);
 	small_solution(&s, &m);
 	solution_verify(&m, &s, &v);
-	assert_true(v.item[0].value <= 4 * DBL_EPSILON);
+	assert_that(v.item[0].value, <=, 4 * DBL_EPSILON);
 	s.ledger[LEDGER_ESCAPED * 3 + 1] += 1e-10;
 	solution_verify(&m, &s, &v);
 	assert_false(verify_good(&v.item[0]));
@@ -178,14 +171,16 @@ static void test_side_rows(void **state)
 	small_solution(&s, &m);
 	solution_side_row(&m, &s, 0, &front);
 	solution_side_row(&m, &s, 1, &back);
-	near(front.area, .25);
-	near(front.centre[0], .5), near(front.centre[1], 1. / 3);
-	near(front.normal[2], 1), near(back.normal[2], -1);
+	assert_near(front.area, .25, 1e-14);
+	assert_near(front.centre[0], .5, 1e-14);
+	assert_near(front.centre[1], 1. / 3, 1e-14);
+	assert_near(front.normal[2], 1, 1e-14);
+	assert_near(back.normal[2], -1, 1e-14);
 	assert_false(signbit(back.normal[0]));
-	near(back.h[0], (.5 + .25 + .125) * 3); /* the ramps at row 1, band 0 */
-	near(back.m[0], .5 * back.h[0]);
+	assert_near(back.h[0], (.5 + .25 + .125) * 3, 1e-14); /* the ramps at row 1, band 0 */
+	assert_near(back.m[0], .5 * back.h[0], 1e-14);
 	solution_side_row(&m, NULL, 4, &front);
-	near(front.e[0], 100 * 3.14159265358979323846);
+	assert_near(front.e[0], 100 * 3.14159265358979323846, 1e-14);
 	solution_free(&s);
 	model_free(&m);
 }

@@ -46,8 +46,8 @@ static void test_furnace(void **state)
 		furnace(&t, exponent[i]);
 		struct view_stats s = render(&t, &f, &o, &im);
 		for (size_t p = 0; p < 3 * 40 * 30; p++)
-			assert_true(fabs((double)im.pixel[p] * PI - 1) < 1e-6);
-		assert_true(s.cut < 1e-6 * s.radiance);
+			assert_near((double)im.pixel[p] * PI, 1, 1e-6);
+		assert_that(s.cut, <, 1e-6 * s.radiance);
 		picture_image_free(&im);
 		stage_free(&t);
 	}
@@ -68,9 +68,9 @@ static void test_cut_bound(void **state)
 		o.cutoff = i < 4 ? 0 : .1;
 		struct view_stats s = render(&t, &f, &o, &im);
 		double missing = 3 / PI - s.radiance;
-		assert_true(missing > 0);
-		assert_true(missing <= s.cut * (1 + 1e-6));
-		assert_true(missing > .5 * s.cut); /* and the bound is not idle */
+		assert_that(missing, >, 0);
+		assert_that(missing, <=, s.cut * (1 + 1e-6));
+		assert_that(missing, >, .5 * s.cut); /* and the bound is not idle */
 		picture_image_free(&im);
 	}
 	stage_free(&t);
@@ -99,7 +99,7 @@ static void test_layers(void **state)
 		for (int c = 0; c < 3; c++) {
 			float sum = picture_image_plane(&im, 3 + c)[p] + picture_image_plane(&im, 6 + c)[p] +
 			            picture_image_plane(&im, 9 + c)[p];
-			assert_true(fabsf(sum - picture_image_plane(&im, c)[p]) < 1e-6f);
+			assert_that(fabsf(sum - picture_image_plane(&im, c)[p]), <, 1e-6f);
 		}
 	for (size_t j = 0; j < 20; j++)
 		for (size_t i = 0; i < 24; i++) {
@@ -108,13 +108,13 @@ static void test_layers(void **state)
 			picture_camera_ray(&f, (double)i + .5, (double)j + .5, org, dir);
 			for (int k = 0; k < 3; k++)
 				n[k] = (double)picture_image_plane(&im, 13 + k)[p];
-			assert_true(v3_dot(n, dir) < 0 && fabs(v3_length(n) - 1) < 1e-6);
+			assert_that(v3_dot(n, dir), <, 0);
+			assert_near(v3_length(n), 1, 1e-6);
 			double t1 = (double)picture_image_plane(&im, 12)[p] / v3_dot(dir, f.forward);
 			v3_mad(org, t1, dir, x); /* Z leads to the element's plane */
 			v3_sub(x, &t.m.vertex[3 * (size_t)t.m.element.corner[3 * element]], x);
-			assert_true(fabs(v3_dot(x, n)) < 1e-5);
-			assert_true(picture_image_plane(&im, 17)[p] ==
-			            (float)t.m.element.patch[element]);
+			assert_that(fabs(v3_dot(x, n)), <, 1e-5);
+			assert_that(picture_image_plane(&im, 17)[p], ==, (float)t.m.element.patch[element]);
 		}
 	picture_image_free(&im);
 	stage_free(&t);
@@ -152,7 +152,9 @@ static void test_threads(void **state)
 	o.threads = 4;
 	struct view_stats sb = render(&t, &f, &o, &b);
 	assert_memory_equal(a.pixel, b.pixel, 50 * 37 * 21 * sizeof *a.pixel);
-	assert_true(sa.rays == sb.rays && sa.radiance == sb.radiance && sa.cut == sb.cut);
+	assert_that(sa.rays, ==, sb.rays);
+	assert_that(sa.radiance, ==, sb.radiance);
+	assert_that(sa.cut, ==, sb.cut);
 	picture_image_free(&a);
 	picture_image_free(&b);
 	stage_free(&t);
@@ -171,10 +173,10 @@ static void test_sides(void **state)
 	use_method(&t, VIEW_MESH);
 	/* Front: rho_s = 0 there, tau_s of the back; the lamp below shines through. */
 	double front = .5 + (.1 * 2 + .25 * 3) / PI + .05 * 20;
-	assert_true(fabs(look(&t, &o, .1, .2, 1, .3, .1, 0) - front) < 1e-5);
+	assert_near(look(&t, &o, .1, .2, 1, .3, .1, 0), front, 1e-5);
 	/* Back: its own rho_s shows the lamp below, the front's tau_s the one above. */
 	double back = .25 + (.15 * 3 + .2 * 2) / PI + .4 * 20 + .3 * 10;
-	assert_true(fabs(look(&t, &o, .1, .2, -1, .3, .1, 0) - back) < 1e-5);
+	assert_near(look(&t, &o, .1, .2, -1, .3, .1, 0), back, 1e-5);
 	stage_free(&t);
 }
 
@@ -203,10 +205,10 @@ static void test_one_sided(void **state)
 	grid_quad(&t.m, 1, 2, pane, x, y);
 	grid_quad(&t.m, 1, 3, below, x, y);
 	stage_end(&t, 0);
-	assert_true(fabs(look(&t, &o, .1, .2, .5, .3, .1, 2) - 7) < 1e-6);
-	assert_true(fabs(look(&t, &o, .1, .2, -.5, .3, .1, 2) - 7) < 1e-6);
-	assert_true(look(&t, &o, .1, .2, .5, .3, .1, -1) == 0);
-	assert_true(fabs(look(&t, &o, .1, .2, 1.5, .3, .1, -1) - 3) < 1e-6);
+	assert_near(look(&t, &o, .1, .2, .5, .3, .1, 2), 7, 1e-6);
+	assert_near(look(&t, &o, .1, .2, -.5, .3, .1, 2), 7, 1e-6);
+	assert_that(look(&t, &o, .1, .2, .5, .3, .1, -1), ==, 0);
+	assert_near(look(&t, &o, .1, .2, 1.5, .3, .1, -1), 3, 1e-6);
 	stage_free(&t);
 }
 
@@ -231,16 +233,16 @@ static void test_background_and_bands(void **state)
 		int named = bands == 1 || bands == 3 ? 0 : bands;
 		assert_int_equal(im.channels, 3 + named + 2);
 		for (int c = 0; c < 3; c++)
-			assert_true(picture_image_plane(&im, c)[40] == (float)(c < bands ? c + 1 : bands));
+			assert_that(picture_image_plane(&im, c)[40], ==, (float)(c < bands ? c + 1 : bands));
 		for (int b = 0; b < named; b++) {
 			char name[16];
 			snprintf(name, sizeof name, "band.%d", b);
 			assert_int_equal(picture_image_channel(&im, name), 3 + b);
-			assert_true(picture_image_plane(&im, 3 + b)[40] == (float)(b + 1));
+			assert_that(picture_image_plane(&im, 3 + b)[40], ==, (float)(b + 1));
 		}
-		assert_true(im.pixel[0] == 0); /* the corner looks past it */
+		assert_that(im.pixel[0], ==, 0); /* the corner looks past it */
 		assert_true(isinf(picture_image_plane(&im, picture_image_channel(&im, "Z"))[0]));
-		assert_true(picture_image_plane(&im, picture_image_channel(&im, "element"))[0] == -1);
+		assert_that(picture_image_plane(&im, picture_image_channel(&im, "element"))[0], ==, -1);
 		picture_image_free(&im);
 		stage_free(&t);
 	}

@@ -55,8 +55,8 @@ static void test_tails(void **state)
 			worst = fmax(worst, fabs(v - .5));
 		}
 		printf("# mirrors %g, panes %g: %g, %g off at most\n", rho_s, tau_s, mean, worst);
-		assert_true(fabs(mean - .5) < 2e-3);
-		assert_true(worst < .05);
+		assert_near(mean, .5, 2e-3);
+		assert_that(worst, <, .05);
 		picture_image_free(&im);
 		stage_free(&t);
 	}
@@ -92,7 +92,8 @@ static void test_errors(void **state)
 		}
 		printf("# %zu cells: %.3g %% off, stated %.2f of that\n", n * n, 100 * sqrt(off / 900) / .25 * PI,
 		       sqrt(stated / off));
-		assert_true(stated > .25 * off && stated < 4 * off);
+		assert_that(stated, >, .25 * off);
+		assert_that(stated, <, 4 * off);
 		picture_image_free(&im);
 		stage_free(&t);
 	}

@@ -28,7 +28,7 @@ static void test_lobes(void **state)
 		stage_end(&t, 0);
 		double x = sqrt(.75), a = bsdf_lobe_albedo(k, cosine);
 		double one = look(&t, &o, x, 0, .5, 0, 0, 0);
-		assert_true(fabs(one - 10 * .6 * (kind ? a : 1)) < 1e-4);
+		assert_near(one, 10 * .6 * (kind ? a : 1), 1e-4);
 		o.lobe_samples = 4096;
 		double many = look(&t, &o, x, 0, .5, 0, 0, 0), expected = 0, sum = 0;
 		/* The same integral by quadrature over the lobe. */
@@ -43,8 +43,8 @@ static void test_lobes(void **state)
 				sum += w;
 			}
 		expected *= 10 * .6 * (kind ? (k + 1) / (2 * PI) : 1);
-		assert_true(fabs(sum / bsdf_lobe_normaliser(k, cosine) - 1) < 1e-3);
-		assert_true(fabs(many / expected - 1) < 5e-3);
+		assert_near(sum / bsdf_lobe_normaliser(k, cosine), 1, 1e-3);
+		assert_near(many / expected, 1, 5e-3);
 		stage_free(&t);
 	}
 }
@@ -108,7 +108,7 @@ static void test_lamp_in_lobe(void **state)
 			o.lobe_samples = VIEW_LOBE_ENOUGH;
 			double seen = look(&t, &o, eye[0], eye[1], eye[2], at[0], at[1], at[2]);
 			double sum = lamp_seen(&t.m, at, out, 1, 1);
-			assert_true(fabs(seen - sum) < 2e-3 * sum + 1e-6);
+			assert_near(seen, sum, 2e-3 * sum + 1e-6);
 			stage_free(&t);
 		}
 }
@@ -143,7 +143,7 @@ static void test_image_in_lobe(void **state)
 			o.lobe_samples = 256;
 			double seen = look(&t, &o, eye[0], eye[1], eye[2], 0, 0, 0);
 			printf("# %s, exponent %g: %g, exact %g\n", pane ? "pane" : "mirror", k, seen, sum);
-			assert_true(fabs(seen - sum) < .02 * sum + 1e-6);
+			assert_near(seen, sum, .02 * sum + 1e-6);
 			stage_free(&t);
 		}
 }
@@ -186,7 +186,7 @@ static void test_lobe_errors(void **state)
 			compare(&t, samples[i], &stated, &off, &all);
 			printf("# exponent %g, %d samples: stated %.3g of the true error\n", k, samples[i],
 			       sqrt(stated / off));
-			assert_true(stated > .25 * off);
+			assert_that(stated, >, .25 * off);
 			/* More than that, where there are many samples for how smooth light is. */
 			assert_true(stated < 4 * off || stated < 2.5e-3 * all);
 			stage_free(&t);
