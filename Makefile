@@ -3,7 +3,9 @@
 #   make            programs and libcommon.a in build/
 #   make demo       install what is missing, build, render the Cornell box
 #   make check      install what is missing, build, run all tests
-#   make check SAN=1  the same under ASan and UBSan, in build-san/
+#   make check T=lobe    the tests of one program or file, T=lobe:energy some of them
+#   make check-fast      those that take no more than seconds; installs nothing
+#   make check SAN=1     the same under ASan and UBSan, in build-san/
 #   make report     speed and accuracy, measured: build/report/index.html
 
 VERSION := 0.1.0
@@ -98,12 +100,32 @@ demo: deps
 
 # ---- tests ----
 
+# A slow test says so itself: a line `# tier: slow` in its file, slow_unit_test() in C.
 CHECKS := $(sort $(wildcard tests/tools/*.t tests/tools/*.py))
+TESTS := $(UNIT_TESTS) $(CHECKS)
+RUN = BUILD=$(abspath $(BUILD)) PYTHON=$(PYTHON) ONLY='$(ONLY)' tests/run.pl -j 2
 
+ifndef T
 check: deps
 	@$(MAKE) --no-print-directory -j2 all unit
 	@$(MAKE) --no-print-directory check-layers check-man
-	@BUILD=$(abspath $(BUILD)) PYTHON=$(PYTHON) tests/run.pl -j 2 $(UNIT_TESTS) $(CHECKS)
+	@$(RUN) $(TESTS)
+else
+# T=lobe: programs whose name contains it; T=lobe:energy: their tests whose name contains that.
+FILE := $(firstword $(subst :, ,$(T)))
+ONLY := $(if $(findstring :,$(T)),$(subst $(FILE):,,$(T)))
+WANTED := $(foreach t,$(TESTS),$(if $(findstring $(FILE),$(notdir $t)),$t))
+check:
+	@[ -n '$(WANTED)' ] || { echo 'no test is called *$(FILE)*'; exit 1; }
+	@$(MAKE) --no-print-directory -j2 $(filter $(BUILD)/%,$(WANTED)) $(if $(filter tests/%,$(WANTED)),all)
+	@$(RUN) $(WANTED)
+endif
+
+# What takes 30 CPU seconds, installs nothing and needs no network.
+check-fast:
+	@$(MAKE) --no-print-directory -j2 all unit
+	@$(MAKE) --no-print-directory check-layers check-man
+	@FAST=1 $(RUN) $(filter-out $(shell grep -l '^# tier: slow' $(CHECKS)),$(TESTS))
 
 # Arrows point down only: tools -> formats -> lib, and lib knows no files.
 check-layers:
@@ -185,7 +207,7 @@ uninstall:
 clean:
 	rm -rf build build-san out
 
-.PHONY: all unit deps demo check check-layers check-man oracles bench report report-long bench-form-factors \
-	format install uninstall clean
+.PHONY: all unit deps demo check check-fast check-layers check-man oracles bench report report-long \
+	bench-form-factors format install uninstall clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

@@ -1,7 +1,9 @@
 #!/usr/bin/perl
-# Runs TAP tests and ends with one line that counts them. usage: run.pl [-j N] FILE...
+# Runs TAP tests, repeats the lines of those that failed, and ends with one line that
+# counts them all. usage: run.pl [-j N] FILE...
 use strict;
 use warnings;
+use File::Basename;
 use TAP::Harness;
 
 my $jobs = 1;
@@ -21,9 +23,21 @@ my $harness = TAP::Harness->new({
 		return [$file];
 	},
 });
+my @lines;    # of failed tests, with the comments below them
+$harness->callback(made_parser => sub {
+	my ($parser, $job) = @_;
+	my ($name, $failing) = (basename($job->[0]), 0);
+	$parser->callback(ALL => sub {
+		my ($line) = @_;
+		$failing = !$line->is_ok if $line->is_test;
+		push @lines, "$name: " . $line->raw if $failing && $line->raw !~ /error: Failure!$/;
+	});
+});
 my $all = $harness->runtests(@ARGV);
 my $broken = grep { $_->has_problems && !$_->failed } map { $all->{parser_for}{$_} } @ARGV;
 my $failed = scalar($all->failed) + $broken;
 my ($passed, $skipped) = (scalar $all->passed, scalar $all->skipped);
+print map { "$_\n" } @lines;
 printf "%d passed, %d failed, %d skipped\n", $passed - $skipped, $failed, $skipped;
-exit($failed || !$all->all_passed ? 1 : 0);
+print "no test has '$ENV{ONLY}' in its name\n" if $all->total == 0 && $ENV{ONLY};
+exit($failed || !$all->all_passed || $all->total == 0 ? 1 : 0);

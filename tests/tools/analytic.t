@@ -1,4 +1,5 @@
 #!/bin/sh
+# tier: slow
 # ffcalc -m analytic --to patches: threads, shards, reciprocity, what it leaves to rays.
 . "$(dirname "$0")/tap.sh"
 

@@ -1,4 +1,5 @@
 #!/bin/sh
+# tier: slow
 # Bad glTF: each file is refused with its own message, exit 1, no output file.
 . "$(dirname "$0")/tap.sh"
 

@@ -1,4 +1,5 @@
 #!/bin/sh
+# tier: slow
 # Bad input: one clear line, exit 1, no output file.
 . "$(dirname "$0")/tap.sh"
 

@@ -1,4 +1,5 @@
 #!/bin/sh
+# tier: slow
 # Energy, on every scene of the repository and by both methods: rows that close, a
 # ledger that balances at the end and after every step, and what --verify says.
 . "$(dirname "$0")/tap.sh"

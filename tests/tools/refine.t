@@ -1,4 +1,5 @@
 #!/bin/sh
+# tier: slow
 # mesh --refine: a second mesh from a first solution, its errors, and a Makefile's loop.
 . "$(dirname "$0")/tap.sh"
 

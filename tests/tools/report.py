@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# tier: slow
 """The parts of `make report`: which pixels are compared, errors without the yardstick's
 noise, fits, a page of tiny samples, and the tables in RESULTS.md and README.md."""
 import json

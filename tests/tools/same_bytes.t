@@ -1,4 +1,5 @@
 #!/bin/sh
+# tier: slow
 # Caches and pictures have the same bytes for any number of threads, in any
 # directory, at every run.
 . "$(dirname "$0")/tap.sh"

@@ -1,4 +1,5 @@
 #!/bin/sh
+# tier: slow
 # What shoot states of its errors, against reference: within a factor 2 of the true error of
 # the elements' irradiance (sampling), and of a picture (with what is between elements).
 . "$(dirname "$0")/tap.sh"

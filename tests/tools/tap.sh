@@ -1,5 +1,6 @@
 # Helpers of the command tests, sourced by each: TAP on stdout, programs in $BUILD
-# (default build), scratch files in $T, which is removed at the end.
+# (default build), scratch files in $T, which is removed at the end. With ONLY=text
+# only the checks whose name contains it.
 
 top=$(cd "$(dirname "$0")/../.." && pwd)
 bin=$(cd "$top" && cd "${BUILD:-build}" && pwd) || exit 1
@@ -15,8 +16,13 @@ cleanup() { :; }
 PATH=$bin:$PATH
 count=0
 
+wanted() {
+	case $1 in *"${ONLY:-}"*) ;; *) false ;; esac
+}
+
 # result STATUS NAME: a test line; 0 is good.
 result() {
+	wanted "$2" || return
 	count=$((count + 1))
 	if [ "$1" -eq 0 ]; then
 		echo "ok $count - $2"
@@ -26,6 +32,7 @@ result() {
 }
 
 skip() {
+	wanted "$1" || return
 	count=$((count + 1))
 	echo "ok $count - $1 # SKIP $2"
 }
@@ -34,6 +41,7 @@ skip() {
 check() {
 	check_name=$1
 	shift
+	wanted "$check_name" || return
 	"$@" >"$T/check.out" 2>"$T/check.err"
 	check_status=$?
 	result $check_status "$check_name"
@@ -53,6 +61,7 @@ prepare() {
 refuses() {
 	want=$1 pattern=$2 refuse_name=$3
 	shift 3
+	wanted "$refuse_name" || return
 	rm -rf "$T/out"
 	"$@" >"$T/refuse.out" 2>"$T/refuse.err" </dev/null
 	status=$? why=

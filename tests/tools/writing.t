@@ -1,4 +1,5 @@
 #!/bin/sh
+# tier: slow
 # Output that cannot be written, and runs that are stopped half-way: exit 1, one
 # line, and the old file whole.
 . "$(dirname "$0")/tap.sh"

@@ -650,8 +650,8 @@ static void test_emission(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_chi_square_of_lobes),
-		cmocka_unit_test(test_mixed_materials),
+		slow_unit_test(test_chi_square_of_lobes),
+		slow_unit_test(test_mixed_materials),
 		cmocka_unit_test(test_reciprocity_ratio_table),
 		cmocka_unit_test(test_exponent_one_is_diffuse),
 		cmocka_unit_test(test_reciprocal_lobe),
@@ -662,5 +662,5 @@ int main(void)
 		cmocka_unit_test(test_grazing),
 		cmocka_unit_test(test_emission),
 	};
-	return cmocka_run_group_tests_name("bsdf", tests, NULL, NULL);
+	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -715,7 +715,7 @@ int main(void)
 		cmocka_unit_test(test_bad_model_is_not_written),
 		cmocka_unit_test(test_refused_form_factors),
 		cmocka_unit_test(test_forged_form_factors),
-		cmocka_unit_test(test_damaged),
+		slow_unit_test(test_damaged),
 		cmocka_unit_test(test_wrong_kind),
 		cmocka_unit_test(test_foreign_ids),
 		cmocka_unit_test(test_digest),

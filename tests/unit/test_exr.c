@@ -565,7 +565,7 @@ int main(void)
 		cmocka_unit_test(test_attributes),   cmocka_unit_test(test_same_bytes),
 		cmocka_unit_test(test_bad_names),    cmocka_unit_test(test_foreign),
 		cmocka_unit_test(test_refusals),     cmocka_unit_test(test_truncated),
-		cmocka_unit_test(test_flipped),      cmocka_unit_test(test_huge_window),
+		slow_unit_test(test_flipped),      cmocka_unit_test(test_huge_window),
 		cmocka_unit_test(test_old_file_kept),
 	};
 

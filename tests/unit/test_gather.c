@@ -351,12 +351,12 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(rays_go_where_light_is),
 		cmocka_unit_test(gathered),
-		cmocka_unit_test(emitter_seen),
-		cmocka_unit_test(hidden),
+		slow_unit_test(emitter_seen),
+		slow_unit_test(hidden),
 		cmocka_unit_test(open_scene),
 		cmocka_unit_test(close_by),
 		cmocka_unit_test(by_formula),
-		cmocka_unit_test(any_threads),
+		slow_unit_test(any_threads),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

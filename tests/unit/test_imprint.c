@@ -496,7 +496,7 @@ int main(void)
 		cmocka_unit_test(test_close),
 		cmocka_unit_test(test_covered),
 		cmocka_unit_test(test_options),
-		cmocka_unit_test(test_random),
+		slow_unit_test(test_random),
 		cmocka_unit_test(test_many),
 		cmocka_unit_test(test_boxes),
 	};

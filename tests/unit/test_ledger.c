@@ -179,7 +179,7 @@ static void test_bright_and_dim(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_albedos),
+		slow_unit_test(test_albedos),
 		cmocka_unit_test(test_white_band),
 		cmocka_unit_test(test_bright_and_dim),
 	};

@@ -397,7 +397,7 @@ int main(void)
 		cmocka_unit_test(test_invariance),
 		cmocka_unit_test(test_rotation),
 		cmocka_unit_test(test_permuted),
-		cmocka_unit_test(test_soup),
+		slow_unit_test(test_soup),
 		cmocka_unit_test(test_element_within_patch),
 		cmocka_unit_test(test_too_fine),
 	};

@@ -595,7 +595,7 @@ int main(void)
 		cmocka_unit_test(test_mirror_image),
 		cmocka_unit_test(test_pane),
 		cmocka_unit_test(test_open_lobe),
-		cmocka_unit_test(test_partition),
+		slow_unit_test(test_partition),
 		cmocka_unit_test(test_reciprocal_both_ways),
 		cmocka_unit_test(test_one_sided),
 		cmocka_unit_test(test_emission_exponent),
@@ -603,5 +603,5 @@ int main(void)
 		cmocka_unit_test(test_standard_error),
 		cmocka_unit_test(test_threads),
 	};
-	return cmocka_run_group_tests_name("pathtrace", tests, NULL, NULL);
+	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -528,5 +528,5 @@ int main(void)
 		cmocka_unit_test(test_facet_clip),
 		cmocka_unit_test(test_edge_divide),
 	};
-	return cmocka_run_group_tests_name("polygon", tests, NULL, NULL);
+	return cmocka_run_group_tests(tests, NULL, NULL);
 }

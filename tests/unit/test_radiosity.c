@@ -423,7 +423,7 @@ int main(void)
 		cmocka_unit_test(furnace_by_rays),
 		cmocka_unit_test(furnace_by_hemicubes),
 		cmocka_unit_test(plates_by_rays),
-		cmocka_unit_test(plates_by_hemicubes),
+		slow_unit_test(plates_by_hemicubes),
 		cmocka_unit_test(six_bands),
 		cmocka_unit_test(patches_as_receivers_f32),
 		cmocka_unit_test(patches_as_receivers_f64),

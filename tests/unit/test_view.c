@@ -253,7 +253,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_furnace), cmocka_unit_test(test_cut_bound),
 		cmocka_unit_test(test_layers), cmocka_unit_test(test_layer_names),
-		cmocka_unit_test(test_threads), cmocka_unit_test(test_sides),
+		slow_unit_test(test_threads), cmocka_unit_test(test_sides),
 		cmocka_unit_test(test_one_sided),
 		cmocka_unit_test(test_background_and_bands)
 	};

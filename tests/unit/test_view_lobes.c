@@ -196,8 +196,8 @@ static void test_lobe_errors(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_lobes), cmocka_unit_test(test_lamp_in_lobe),
-		cmocka_unit_test(test_image_in_lobe), cmocka_unit_test(test_lobe_errors)
+		cmocka_unit_test(test_lobes), slow_unit_test(test_lamp_in_lobe),
+		cmocka_unit_test(test_image_in_lobe), slow_unit_test(test_lobe_errors)
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
