@@ -79,6 +79,7 @@ static void test_block(void **state)
 {
 	(void)state;
 	for (int k = 1; k <= 4; k++) {
+		given("k %d", k);
 		check_block(ALL_FACES, k, 1, 1, 0);
 		check_block(NO_BOTTOM, k, 1, 1, 0);
 		check_block(ALL_FACES, k, 0, 1, 0);   /* nothing sees into it */
@@ -94,6 +95,7 @@ static void test_room(void **state)
 	for (int inwards = 0; inwards < 2; inwards++)
 		for (int one_sided = 0; one_sided < 2; one_sided++)
 			for (int faces = 1; faces < 64; faces = 2 * faces + 1) {
+				given("inwards %d, one_sided %d, faces %d", inwards, one_sided, faces);
 				struct lab l = { 0 };
 				scene_begin(&l.m, one_sided);
 				scene_block(&l.m, 0, 0, 0, 1, 2, 3, faces, 3, inwards);
@@ -126,6 +128,7 @@ static void test_not_convex(void **state)
 	assert_int_equal(scene_end(&l.m), 0);
 	ready(&l, 1e-6);
 	for (size_t i = 0; i < l.bodies.bodies; i++) {
+		given("i %zu", i);
 		const struct occluder_body *b = &l.bodies.body[i];
 		/* No body holds the notch. */
 		int holds = !b->flat;
@@ -191,6 +194,7 @@ static void test_inside(void **state)
 
 	(void)state;
 	for (int faces = 31; faces < 64; faces += 32) {
+		given("faces %d", faces);
 		struct lab l = { 0 };
 		double off, sum = 0;
 		far_room(&l.m, 0);
@@ -275,6 +279,7 @@ static void test_sight(void **state)
 {
 	(void)state;
 	for (int solid = 0; solid < 2; solid++) {
+		given("solid %d", solid);
 		assert_int_equal(look(solid, 1, 1), SHAFT_CLEAR);       /* touches the shaft */
 		assert_int_equal(look(solid, 2, 1), SHAFT_CLEAR);
 		assert_int_equal(look(solid, .9, 1), SHAFT_PARTLY);
@@ -310,6 +315,7 @@ static void test_seen(void **state)
 {
 	(void)state;
 	for (uint64_t seed = 1; seed <= 24; seed++) {
+		given("seed %d", (int)seed);
 		struct lab l = { 0 };
 		struct dice d = { seed, 1000 };
 		struct err e = { 0 };
@@ -357,6 +363,7 @@ static void test_exchange(void **state)
 
 	(void)state;
 	for (int k = 0; k < 12; k++) {
+		given("k %d", k);
 		struct lab l = { 0 };
 		double off, at[3];
 		far_room(&l.m, k & 1);

@@ -175,6 +175,7 @@ static void test_chi_square_of_lobes(void **state)
 
 	(void)state;
 	for (int kind = LOBE_PAPER; kind <= LOBE_RECIPROCAL; kind++) {
+		given("kind %d", kind);
 		struct model m;
 		begin(&m, 1, (enum lobe_kind)kind);
 		for (size_t i = 0; i < COUNT(k) * COUNT(degrees) * 4; i++) {
@@ -364,6 +365,7 @@ static void test_mixed_materials(void **state)
 	(void)state;
 	for (int kind = LOBE_PAPER; kind <= LOBE_RECIPROCAL; kind++)
 		for (int ideal = 0; ideal < 2; ideal++) {
+			given("kind %d, ideal %d", kind, ideal);
 			struct model m;
 			mixed_material(&m, (enum lobe_kind)kind, ideal);
 			for (size_t i = 0; i < COUNT(degrees); i++) {
@@ -396,6 +398,7 @@ static void test_reciprocity_ratio_table(void **state)
 	m.material.rho_s[FRONT] = .6;
 	for (size_t i = 0; i < COUNT(table); i++)
 		for (size_t j = 0; j < COUNT(degrees); j++) {
+			given("k %g, %g degrees", table[i].k, degrees[j]);
 			double a[3], b[3], ab, ba;
 			m.material.alpha[FRONT] = table[i].k;
 			direction(0, 0, a);
@@ -418,6 +421,7 @@ static void test_exponent_one_is_diffuse(void **state)
 	m.material.rho_s[FRONT] = .6;
 	m.material.alpha[FRONT] = 1;
 	for (int i = 0; i < 1000; i++) {
+		given("i %d", i);
 		double from[3], to[3], f;
 		direction(0, 0, from);
 		direction(pi / 2 * rng_uniform(&r), 2 * pi * rng_uniform(&r), to);
@@ -460,6 +464,7 @@ static void test_reciprocal_albedo(void **state)
 	m.material.rho_s[FRONT] = .8;
 	m.material.alpha[FRONT] = 20;
 	for (int deg = 5; deg < 90; deg += 12) { /* 8 means within 4 standard errors */
+		given("deg %d", deg);
 		double known[3], mean = 0, square = 0;
 		direction(deg * pi / 180, 0, known);
 		for (int i = 0; i < N; i++) {
@@ -499,6 +504,7 @@ static void test_flipped_winding(void **state)
 		turned.material.beta[s] = m.material.beta[!s];
 	}
 	for (int i = 0; i < 2000; i++) {
+		given("i %d", i);
 		double a[3], b[3], f[3], g[3], u[3];
 		struct bsdf_sample s, t;
 		direction(pi * rng_uniform(&r), 2 * pi * rng_uniform(&r), a);
@@ -605,6 +611,7 @@ static void test_grazing(void **state)
 	(void)state;
 	for (int kind = LOBE_PAPER; kind <= LOBE_RECIPROCAL; kind++)
 		for (double k = 0; k <= 1e8; k = 20 * k + .5) {
+			given("kind %d, k %g", kind, k);
 			struct model m;
 			mixed_material(&m, (enum lobe_kind)kind, 0);
 			for (int s = 0; s < 2; s++)
@@ -629,6 +636,7 @@ static void test_emission(void **state)
 	begin(&m, 1, LOBE_PAPER);
 	m.material.emission[BACK] = 3;
 	for (double e = 1; e < 40; e = 2 * e + .5) {
+		given("e %g", e);
 		double flux = 0, l, w[3];
 		m.material.emission_exponent[BACK] = e;
 		for (int i = 0; i < 100000; i++) { /* midpoints in the cosine */

@@ -249,6 +249,7 @@ static void test_lists_and_spans(void **state)
 	write_ff();
 	must(file_ff_open(ff_path, &model, NULL, &f, &e), &e);
 	for (uint64_t b = 0; b < ff.block.n; b++) {
+		given("b %d", (int)b);
 		const uint64_t *start = ff.block.start + b;
 		expect_block(&ff, b, ff.column + start[0], ff.value + start[0],
 		             (uint32_t)(start[1] - start[0]));
@@ -695,6 +696,7 @@ static void test_python(void **state)
 	         files[0], files[1], files[2]);
 	assert_int_equal(system(command), 0);
 	for (int i = 0; i < 3; i++) {
+		given("%s", files[i]);
 		snprintf(command, sizeof command, "/usr/bin/python3 tests/independent/read_cache.py %s | "
 		         "grep '^%s [FU]' > /dev/null", files[i], i == 1 ? "value" : "vertex");
 		assert_int_equal(system(command), 0);

@@ -30,8 +30,10 @@ static void test_sizes(void **state)
 	assert_int_equal(h, 200);
 	static const char *const wrong[] = { "", "x", "64", "64x", "3x", "x3", "3x0", "0x3", "-3x4", "3x4x5",
 		"3 x4", "3x+4", "99999999999x1", "3x4 ", "1e2x3" };
-	for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
+	for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+		given("size %s", wrong[i]);
 		assert_int_equal(picture_camera_parse_size(wrong[i], &w, &h), -1);
+	}
 }
 
 static void test_resolution(void **state)

@@ -285,6 +285,7 @@ static void test_signals(void **state)
 	(void)state;
 	assert_non_null(mkdtemp(directory));
 	for (size_t i = 0; i < 4; i++) {
+		given("signal %d", numbers[i]);
 		char number[16];
 
 		/* Whoever runs the tests may ignore some (nohup, a shell's background). */

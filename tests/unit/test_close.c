@@ -47,6 +47,7 @@ static void closes_and_improves(void **state)
 
 	(void)state;
 	for (int trial = 0; trial < 20; trial++) {
+		given("trial %d", trial);
 		double missing[ROWS] = { 0 };
 		size_t n = make(d, wrong, missing, &r);
 		for (int i = 0; i < ROWS; i++)

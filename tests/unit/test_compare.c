@@ -130,8 +130,10 @@ static void test_percentiles(void **state)
 		a.pixel[i] = b.pixel[i] + (float)(1 + (37 * i) % 100) * (i % 2 ? 1 : -1);
 	}
 	compare(&a, red, &b, 1, NULL, &d);
-	for (int i = 0; i < COMPARE_PERCENTILES; i++)
+	for (int i = 0; i < COMPARE_PERCENTILES; i++) {
+		given("i %d", i);
 		assert_near(d.percentile[i], picture_compare_percentile[i] * 1e-3, 1e-7);
+	}
 	for (int i = 0; i < 100; i++)
 		mask[i] = 1 + (37 * i) % 100 > 10;
 	compare(&a, red, &b, 1, mask, &d);
@@ -174,11 +176,15 @@ static void test_masks(void **state)
 	im.pixel[8 + 3] = 1;
 	im.pixel[24 + 5] = INFINITY;
 	assert_int_equal(picture_compare_mask_emitters(&im, mask), 0);
-	for (int i = 0; i < 8; i++)
+	for (int i = 0; i < 8; i++) {
+		given("i %d", i);
 		assert_int_equal(mask[i], i == 3);
+	}
 	assert_int_equal(picture_compare_mask_nothing(&im, mask), 0);
-	for (int i = 0; i < 8; i++)
+	for (int i = 0; i < 8; i++) {
+		given("i %d", i);
 		assert_int_equal(mask[i], i == 3 || i == 5);
+	}
 	picture_image_free(&im);
 	assert_int_equal(picture_image_new(&im, 4, 2, 3, names, &e), 0);
 	assert_int_equal(picture_compare_mask_emitters(&im, mask), -1);

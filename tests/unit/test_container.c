@@ -272,6 +272,7 @@ static void test_killed(void **state)
 	(void)state;
 	write_sample(path, "old");
 	for (int i = 0; i < 12; i++) {
+		given("i %d", i);
 		pid_t child = fork();
 		if (child == 0) {
 			struct err e = { 0 };
@@ -342,6 +343,7 @@ static void test_flipped_bytes(void **state)
 	assert_int_equal(fstat(fd, &st), 0);
 	for (off_t i = 0; i < st.st_size; i++)
 		for (size_t k = 0; k < sizeof flips; k++) {
+			given("i %ld, k %zu", (long)i, k);
 			unsigned char good, bad;
 			struct err e = { 0 };
 			assert_int_equal(pread(fd, &good, 1, i), 1);
@@ -364,6 +366,7 @@ static void test_truncated(void **state)
 	write_sample(path, "one");
 	assert_int_equal(stat(path, &st), 0);
 	for (off_t n = st.st_size; n-- > 0;) {
+		given("n %ld", (long)n);
 		struct err e = { 0 };
 		assert_int_equal(truncate(path, n), 0);
 		if (!read_through(path, &e))
@@ -451,6 +454,7 @@ static void test_forged_headers(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		given("i %zu", i);
 		struct err e = { 0 };
 		forge(cases[i].header, 0);
 		struct container *c = file_container_open(path, "twopass.mesh", &e);
@@ -474,6 +478,7 @@ static void test_absurd_lengths(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++) {
+		given("i %zu", i);
 		struct err e = { 0 };
 		forge(META ARRAY("a", "F64", "[8]", "0", "64") "}", lengths[i]);
 		assert_null(file_container_open(path, NULL, &e));
@@ -587,6 +592,7 @@ static void test_history(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		given("i %zu", i);
 		struct err e = { 0 };
 		int argc = 0;
 		while (cases[i].argv[argc])

@@ -115,6 +115,7 @@ static void test_rectangle(void **state)
 	put(&t, 4, 1, -.5, -.3, 1.5, 1, .6);
 	stage_end(&t);
 	for (double x = -1.9; x < 2; x += .37) {
+		given("x %g", x);
 		assert_close(lit(&t, x, .3 * x, FRONT, &error),
 		     PI * factor(-.5 - x, .5 - x, -.3 - .3 * x, .3 - .3 * x, 1.5), 1e-12);
 		assert_that(error, ==, 0);
@@ -137,6 +138,7 @@ static void test_hidden(void **state)
 	stage_end(&t);
 	/* From (x, 0) the sheet's edge x = 0 is seen at -x on the lamp. */
 	for (double x = -1.4; x < 1.5; x += .1) {
+		given("x %g", x);
 		double edge = fmin(1, fmax(-1, -x));
 		assert_close(lit(&t, x, 0, FRONT, &error), PI * factor(-1 - x, edge - x, -1, 1, 1), 1e-9);
 		assert_that(error, ==, 0);
@@ -159,6 +161,7 @@ static void test_sampled(void **state)
 		put(&t, 2, 1, -1 + .25 * (i % SIDE), -1 + .25 * (i / SIDE), 1, .2, .2);
 	stage_end(&t);
 	for (double x = -1.3; x < 1.4; x += .19) {
+		given("x %g", x);
 		double sum = 0;
 		for (int i = 0; i < SIDE * SIDE; i++) {
 			double x0 = -1 + .25 * (i % SIDE) - x, y0 = -1 + .25 * (i / SIDE);
@@ -187,6 +190,7 @@ static void test_exponent(void **state)
 	(void)state;
 
 	for (int hidden = 0; hidden < 2; hidden++) {
+		given("hidden %d", hidden);
 		stage_new(&t, 3, 1);
 		put_floor(&t, 1);
 		put(&t, 1, 1, -1, -1, 1, 2, 2);

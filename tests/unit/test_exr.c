@@ -347,6 +347,7 @@ static void test_foreign(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof file / sizeof *file; i++) {
+		given("i %zu", i);
 		struct image im;
 		struct err e = { 0 };
 
@@ -424,6 +425,7 @@ static void test_truncated(void **state)
 	write_small(6, 20, EXR_FILE_ZIP);
 	bytes = slurp(place("small.exr"), &size);
 	for (size_t n = 0; n < size; n++) {
+		given("n %zu", n);
 		struct exr_file_info info;
 		struct err e = { 0 };
 
@@ -464,8 +466,10 @@ static int flip_all(enum exr_file_compression compression)
 static void test_flipped(void **state)
 {
 	(void)state;
-	for (int c = EXR_FILE_ZIP; c <= EXR_FILE_NONE; c++)
+	for (int c = EXR_FILE_ZIP; c <= EXR_FILE_NONE; c++) {
+		given("c %d", c);
 		assert_that(flip_all((enum exr_file_compression)c), >, 100);
+	}
 }
 
 static void test_huge_window(void **state)
@@ -478,6 +482,7 @@ static void test_huge_window(void **state)
 	write_small(6, 20, EXR_FILE_ZIP);
 	bytes = slurp(place("small.exr"), &size);
 	for (size_t n = 8; n + 40 < size; n++) {
+		given("n %zu", n);
 		if (memcmp(bytes + n, "dataWindow", 11) != 0)
 			continue;
 		for (size_t k = 0; k < 10; k++) {

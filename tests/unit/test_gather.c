@@ -175,6 +175,7 @@ static void hidden(void **state)
 	memory_ff(&m, &gathers, &f[1], &stats);
 	check_closure(&f[1]);
 	for (uint32_t from = 0; from < 7; from++) {
+		given("from %u", from);
 		double *h[2] = { lit_by(&m, &f[0], from), lit_by(&m, &f[1], from) };
 		double squares = 0, sum = 0, flux[2] = { 0 };
 		for (size_t i = 0; i < 2 * m.element.n; i++) {

@@ -242,8 +242,10 @@ static void test_names(void **state)
 
 	(void)state;
 	assert_int_equal(s.m.surface.n, 5);
-	for (size_t i = 0; i < 5; i++)
+	for (size_t i = 0; i < 5; i++) {
+		given("i %zu", i);
 		assert_string_equal(s.m.surface.name[i], want[i]);
+	}
 	assert_int_equal(s.m.vertices, 20);
 	assert_string_equal(s.m.material.name[0], "default");
 	assert_true(noted(&s, "glTF's default"));
@@ -453,9 +455,11 @@ static void test_notes(void **state)
 		"material paint: factors outside [0,1] are clamped" };
 
 	(void)state;
-	for (size_t i = 0; i < sizeof want / sizeof *want; i++)
+	for (size_t i = 0; i < sizeof want / sizeof *want; i++) {
+		given("i %zu", i);
 		if (!noted(&s, want[i]))
 			fail_msg("no note '%s'", want[i]);
+	}
 	end(&s);
 }
 
@@ -467,6 +471,7 @@ static void test_rules_keep_energy(void **state)
 
 	(void)state;
 	for (int i = 0; i < 3 * 3 * 3 * 3 * 3; i++) {
+		given("i %d", i);
 		g.metallic = i % 3 / 2.;
 		g.roughness = i / 3 % 3 / 2.;
 		g.transmission = i / 9 % 3 / 2.;

@@ -59,6 +59,7 @@ static void test_not_gltf(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+		given("i %zu", i);
 		put("s.gltf", files[i].text, strlen(files[i].text));
 		refused("s.gltf", files[i].message);
 	}
@@ -293,12 +294,14 @@ static void test_glb(void **state)
 		{ bin + 4, 0x12345678, "buffers[0]: has no uri and the file no BIN chunk" },
 	};
 	for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
+		given("i %zu", i);
 		memcpy(bad, glb, n);
 		memcpy(bad + words[i].at, &words[i].value, 4);
 		put("s.glb", bad, n);
 		refused("s.glb", words[i].message);
 	}
 	for (size_t k = 4; k < n; k += k < 32 || k > n - 200 ? 1 : 37) {
+		given("k %zu", k);
 		put("s.glb", glb, k);
 		refused("s.glb", "GLB: truncated");
 	}

@@ -200,6 +200,7 @@ static void closed_cube_has_no_holes(void **state)
 
 	(void)state;
 	for (int k = 0; k < 4; k++) {
+		given("offset %g, size %g", offset[k], size[k]);
 		struct rng r = rng_seed(2, (uint64_t)k);
 		double lo[3] = { offset[k], -offset[k], offset[k] };
 		struct model m = cube_model(lo, size[k]);
@@ -232,6 +233,7 @@ static void closed_cube_from_its_faces(void **state)
 
 	(void)state;
 	for (int k = 0; k < 2; k++) {
+		given("offset %g", offset[k]);
 		double lo[3] = { offset[k], offset[k], -offset[k] };
 		struct model m = cube_model(lo, 1);
 		struct stage s = stage_new(&m, 64);
@@ -264,6 +266,7 @@ static void near_sheet_blocks(void **state)
 
 	(void)state;
 	for (int k = 0; k < 3; k++) {
+		given("height %g", height[k]);
 		struct model m = model_new(4 + 4, 4);
 		double o[3] = { 0, 0, height[k] }, u[3] = { 1, 0, 0 }, v[3] = { 0, 1, 0 };
 		double ceiling[3] = { -50, -50, .5 }, wide[3] = { 101, 0, 0 }, deep[3] = { 0, 101, 0 };
@@ -300,6 +303,7 @@ static void equal_depths_give_the_lowest(void **state)
 	add_triangle(&m, 6, 7, 4);
 	struct stage s = stage_new(&m, 64);
 	for (int i = 0; i < 50; i++) {
+		given("i %d", i);
 		double eye[3] = { rng_uniform(&r), rng_uniform(&r), 0 }, up[3] = { 0, 0, 1 }, frame[3][3];
 		frame_about(up, i, frame);
 		draw(&s, eye, frame, HEMICUBE_VOID);
@@ -394,6 +398,7 @@ static void aligned_grid(void **state)
 	add_grid(&m, o, u, v, 97);
 	struct stage s = stage_new(&m, 64);
 	for (int i = 0; i < 8; i++) {
+		given("i %d", i);
 		double f[2 * 2 * 97 * 97] = { 0 }, frame[3][3], sum = 0;
 		frame_about(up, .4 * i, frame);
 		if (i == 0)
@@ -467,6 +472,7 @@ static void triangles_give_the_same_elements(void **state)
 	elements_only.triangle.n = 0;
 	struct stage s = stage_new(&m, 16), e = stage_new(&elements_only, 16);
 	for (int i = 0; i < 200; i++) {
+		given("i %d", i);
 		double eye[3], frame[3][3];
 		for (int k = 0; k < 3; k++)
 			eye[k] = lo[k] + 2 * rng_uniform(&r);
@@ -499,6 +505,7 @@ static void same_picture_every_time(void **state)
 
 	(void)state;
 	for (int i = 0; i < 5; i++) {
+		given("i %d", i);
 		double eye[3] = { .1 * i, 0, 0 }, other[3] = { 0, 0, .5 }, frame[3][3];
 		random_frame(&r, frame);
 		draw(&s, eye, frame, 3);

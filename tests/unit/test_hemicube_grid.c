@@ -15,6 +15,7 @@ static void delta_factors_sum_to_one(void **state)
 
 	(void)state;
 	for (size_t k = 0; k < sizeof n / sizeof *n; k++) {
+		given("n %d", n[k]);
 		struct hemicube_grid g;
 		long double sum = 0, angle = 0, cosines = 0;
 		assert_int_equal(ff_hemicube_grid_init(&g, n[k], &e), 0);
@@ -45,6 +46,7 @@ static void delta_factors_are_integrals(void **state)
 	(void)state;
 	assert_int_equal(ff_hemicube_grid_init(&g, n, &e), 0);
 	for (size_t i = 0; i < g.pixels; i += 7) {
+		given("i %zu", i);
 		size_t top = (size_t)(n * n), side = i >= top;
 		size_t in = side ? (i - top) % (top / 2) : i;
 		int column = (int)(in % (size_t)n), row = (int)(in / (size_t)n);
@@ -69,6 +71,7 @@ static void lookup_inverts_direction(void **state)
 
 	(void)state;
 	for (size_t k = 0; k < sizeof n / sizeof *n; k++) {
+		given("n %d", n[k]);
 		struct hemicube_grid g;
 		struct rng r = rng_seed(1, k);
 		assert_int_equal(ff_hemicube_grid_init(&g, n[k], &e), 0);
@@ -96,6 +99,7 @@ static void odd_resolution_is_refused(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof n / sizeof *n; i++) {
+		given("n %d", n[i]);
 		struct err e = { 0 };
 		assert_int_equal(ff_hemicube_grid_init(&g, n[i], &e), -1);
 		assert_non_null(strstr(e.text, "even"));

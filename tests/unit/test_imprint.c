@@ -141,6 +141,7 @@ static void test_footprint(void **state)
 	(void)state;
 	for (int place = 0; place < PLACES; place++)
 		for (int one_surface = 0; one_surface < 2; one_surface++) {
+			given("place %d, one_surface %d", place, one_surface);
 			struct model m;
 			double frame[3][3];
 			begin(&m, 2, 0);
@@ -180,10 +181,12 @@ static void test_patches_end_at_lines(void **state)
 		patches += m.surface.n && m.patch.surface[p] == 0;
 	assert_int_equal(patches, 2);
 	assert_near(area_within(&m, 0, frame, within_block), .09, 1e-12);
-	for (size_t p = 0; p < m.patch.n; p++)
+	for (size_t p = 0; p < m.patch.n; p++) {
+		given("p %zu", p);
 		if (m.patch.surface[p] == 0)
 			assert_true(fabs(m.patch.area[p] - .09) < 1e-12 ||
 			            fabs(m.patch.area[p] - .91) < 1e-12);
+	}
 	mesh_report_free(&r);
 	model_free(&m);
 }
@@ -198,6 +201,7 @@ static void test_crossing(void **state)
 {
 	(void)state;
 	for (int place = 0; place < PLACES; place++) {
+		given("place %d", place);
 		struct model m;
 		double frame[3][3];
 		begin(&m, 2, 0);
@@ -226,6 +230,7 @@ static void test_wall(void **state)
 {
 	(void)state;
 	for (int place = 0; place < PLACES; place++) {
+		given("place %d", place);
 		struct model m;
 		struct half_edges g;
 		struct err e = { 0 };
@@ -304,6 +309,7 @@ static void test_close(void **state)
 	(void)state;
 	for (int i = 0; i < 3; i++)
 		for (int place = 0; place < 3; place++) {
+			given("i %d, place %d", i, place);
 			struct model m;
 			double frame[3][3];
 			begin(&m, 2, 0);
@@ -331,6 +337,7 @@ static void test_covered(void **state)
 	(void)state;
 	for (int i = 0; i < 4; i++)
 		for (int place = 0; place < 3; place++) {
+			given("i %d, place %d", i, place);
 			struct model m;
 			double frame[3][3];
 			begin(&m, 2, i == 1);
@@ -365,6 +372,7 @@ static void test_options(void **state)
 
 	(void)state;
 	for (int i = 0; i < 3; i++) {
+		given("i %d", i);
 		begin(&m, 2, 0);
 		add_rectangle(&m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 },
 		              (double[]){ 0, 1, 0 }, 0);
@@ -451,6 +459,7 @@ static void test_boxes(void **state)
 
 	(void)state;
 	for (uint32_t n = 1; n <= MANY; n = 2 * n + 1) {
+		given("n %u", n);
 		double vertex[3 * MANY][3];
 		uint32_t triangle[3 * MANY];
 		struct boxes b;

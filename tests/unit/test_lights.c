@@ -139,6 +139,7 @@ static void rays_carry_the_flux(void **state)
 	add_light(&m, LIGHT_SPOT, 0, 0, 1, down, inner, outer);
 	grid_end(&m);
 	for (uint32_t i = 0; i < RAYS; i++) {
+		given("i %u", i);
 		double u[3] = { rng_sobol(i, 0, 7), rng_sobol(i, 1, 7), rng_sobol(i, 2, 7) };
 		double org[3], dir[3];
 		model_light_ray(&m.light, 0, u, 0, org, dir);

@@ -101,9 +101,11 @@ static void test_normaliser_table(void **state)
 {
 	(void)state;
 	for (size_t i = 0; i < COUNT(normaliser); i++)
-		for (int j = 0; j < ANGLES; j++)
+		for (int j = 0; j < ANGLES; j++) {
+			given("k %g, %g degrees", normaliser[i].k, angle[j]);
 			assert_close(bsdf_lobe_normaliser(normaliser[i].k, cosine(angle[j])),
 			             normaliser[i].value[j], 1e-12);
+		}
 }
 
 /* Integral of sin^k over [lo, hi] by the double-exponential rule. */
@@ -140,10 +142,12 @@ static void test_normaliser_any_exponent(void **state)
 	(void)state;
 	for (double l = -3; l <= 8; l += .37)
 		for (int i = 1; i <= 40; i++) {
+			given("l %g, i %d", l, i);
 			double k = pow(10, l), c = i <= 20 ? cos(i * pi / 42) : pow(10, -.4 * (i - 20));
 			assert_close(bsdf_lobe_normaliser(k, c), slow_normaliser(k, c), 1e-12);
 		}
 	for (double k = 0; k <= 1e8; k = 3 * k + .1) {
+		given("k %g", k);
 		assert_close(bsdf_lobe_normaliser(k, 1), 2 * pi / (k + 1), 1e-14);
 		assert_close(bsdf_lobe_normaliser(k, 0), pi / (k + 1), 1e-14);
 	}
@@ -153,6 +157,7 @@ static void test_table(void **state)
 {
 	(void)state;
 	for (double k = 0; k <= 1e8; k = 2 * k + .7) {
+		given("k %g", k);
 		struct lobe_table t;
 		bsdf_lobe_table_make(&t, k);
 		for (int i = 0; i <= 1000; i++) {
@@ -179,9 +184,11 @@ static void test_albedo_table(void **state)
 {
 	(void)state;
 	for (size_t i = 0; i < COUNT(albedo); i++)
-		for (int j = 0; j < ANGLES; j++)
+		for (int j = 0; j < ANGLES; j++) {
+			given("k %g, %g degrees", albedo[i].k, angle[j]);
 			assert_close(bsdf_lobe_albedo(albedo[i].k, cosine(angle[j])),
 			             albedo[i].value[j], 1e-4);
+		}
 }
 
 /* The albedo integral in coordinates about the normal, by the midpoint rule with
@@ -211,10 +218,13 @@ static void test_albedo(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < COUNT(k); i++)
-		for (size_t j = 0; j < COUNT(theta); j++)
+		for (size_t j = 0; j < COUNT(theta); j++) {
+			given("k %g, %g degrees", k[i], theta[j]);
 			assert_close(bsdf_lobe_albedo(k[i], cosine(theta[j])),
 			             slow_albedo(k[i], theta[j] * pi / 180), 1e-6);
+		}
 	for (double x = 0; x <= 1e6; x = 3 * x + .3) {
+		given("x %g", x);
 		assert_close(bsdf_lobe_albedo(x, 1), (x + 1) / (x + 2), 1e-6);
 		assert_close(bsdf_lobe_albedo(x, 0), .5, 1e-6);
 	}
@@ -231,6 +241,7 @@ static void test_sample_whole(void **state)
 	(void)state;
 	v3_normalise(axis);
 	for (size_t i = 0; i < COUNT(k); i++) {
+		given("k %g", k[i]);
 		struct rng r = rng_seed(7, i);
 		double mean = 0, square = 0;
 		for (int s = 0; s < N; s++) {
@@ -253,6 +264,7 @@ static void test_sample_clipped(void **state)
 	(void)state;
 	for (int deg = 0; deg <= 90; deg += 10)
 		for (int s = 0; s < 2000; s++) {
+			given("deg %d, s %d", deg, s);
 			double axis[3] = { sin(deg * pi / 180), 0, cosine(deg) }, w[3], again[3];
 			double u[2] = { rng_sobol((uint32_t)s, 0, 1), rng_sobol((uint32_t)s, 1, 1) };
 			bsdf_lobe_sample(deg * deg, axis, n, u, w);
@@ -264,6 +276,7 @@ static void test_sample_clipped(void **state)
 	/* the ends of the unit square, and an axis that rounding put below */
 	double low[3] = { 1, 0, -1e-17 }, w[3], u[2] = { 0, 0 };
 	for (int i = 0; i < 4; i++) {
+		given("i %d", i);
 		u[0] = i & 1 ? 1 - 0x1p-53 : 0;
 		u[1] = i & 2 ? 1 - 0x1p-53 : 0;
 		bsdf_lobe_sample(1e8, low, n, u, w);

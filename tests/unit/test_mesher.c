@@ -15,6 +15,7 @@ static void test_square(void **state)
 	assert_int_equal(m.patch.n, 16);
 	assert_int_equal(r.planar_patches, 16);
 	for (size_t p = 0; p < m.patch.n; p++) {
+		given("p %zu", p);
 		assert_int_equal(m.patch.loop[p + 1], p + 1);
 		assert_int_equal(m.patch.loop_start[p + 1] - m.patch.loop_start[p], 4);
 		assert_near(m.patch.area[p], 1. / 16, 1e-15);
@@ -53,6 +54,7 @@ static void test_rectangles(void **state)
 
 	(void)state;
 	for (int i = 0; i < 3; i++) {
+		given("length %g", length[i]);
 		struct model m;
 		begin(&m, 1, 0);
 		add_rectangle(&m, (double[]){ 1, 2, 3 }, (double[]){ 0, 0, length[i] },
@@ -215,6 +217,7 @@ static void test_invariance(void **state)
 	(void)state;
 	for (size_t i = 0; i < sizeof t / sizeof *t; i++)
 		for (int shape = 0; shape < 3; shape++) {
+			given("i %zu, shape %d", i, shape);
 			struct model m;
 			if (shape == 0)
 				make_room(&m);
@@ -246,6 +249,7 @@ static void test_rotation(void **state)
 {
 	(void)state;
 	for (int shape = 0; shape < 3; shape++) {
+		given("shape %d", shape);
 		struct model m[2];
 		struct mesh_report r[2];
 		for (int turn = 0; turn < 2; turn++) {
@@ -297,12 +301,16 @@ static void test_permuted(void **state)
 		r[i] = run(&m[i], sizes(.3, .1, 0));
 	assert_int_equal(m[0].patch.n, m[1].patch.n);
 	assert_int_equal(m[0].element.n, m[1].element.n);
-	for (size_t p = 0; p < m[0].patch.n; p++)
+	for (size_t p = 0; p < m[0].patch.n; p++) {
+		given("p %zu", p);
 		assert_near(m[0].patch.area[p], m[1].patch.area[p], 1e-14);
+	}
 	for (int i = 0; i < 2; i++)
 		qsort(m[i].element.area, m[i].element.n, sizeof(double), compare_doubles);
-	for (size_t i = 0; i < m[0].element.n; i++)
+	for (size_t i = 0; i < m[0].element.n; i++) {
+		given("i %zu", i);
 		assert_that(m[0].element.area[i], ==, m[1].element.area[i]);
+	}
 	for (int i = 0; i < 2; i++) {
 		mesh_report_free(&r[i]);
 		model_free(&m[i]);
@@ -356,6 +364,7 @@ static void test_element_within_patch(void **state)
 
 	(void)state;
 	for (int i = 0; i < 2; i++) {
+		given("patch %g", patch[i]);
 		struct model m;
 		struct mesh_options o = sizes(patch[i], .25, 0);
 		make_square(&m);

@@ -9,6 +9,7 @@ static void test_sliver(void **state)
 
 	(void)state;
 	for (int turn = 0; turn < 2; turn++) {
+		given("turn %d", turn);
 		begin(&m, 3, 0);
 		add_rectangle(&m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 },
 		              (double[]){ 0, 1, 0 }, 0);
@@ -76,6 +77,7 @@ static void test_duplicates(void **state)
 	for (int one_sided = 0; one_sided < 2; one_sided++)
 		for (int c = 0; c < 4; c++)
 			for (int other = 0; other < 2; other++) {
+				given("one_sided %d, c %d, other %d", one_sided, c, other);
 				struct model m;
 				const uint32_t *q = copy[c];
 				int opposite = c == 1 || c == 2;
@@ -155,6 +157,7 @@ static void test_weld(void **state)
 
 	(void)state;
 	for (int i = 0; i < 2; i++) {
+		given("i %d", i);
 		struct model m;
 		begin(&m, 1, 0);
 		add_rectangle(&m, (double[]){ 0, 0, 0 }, (double[]){ 1, 0, 0 },

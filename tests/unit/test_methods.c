@@ -111,8 +111,10 @@ static void test_furnace(void **state)
 	furnace(&t);
 	for (enum view_method k = VIEW_MESH; k <= VIEW_GATHER; k++) {
 		struct image im = render(&t, k, eye, target, 40, 30, 1);
-		for (size_t p = 0; p < 3 * 40 * 30; p++)
+		for (size_t p = 0; p < 3 * 40 * 30; p++) {
+			given("p %zu", p);
 			assert_near((double)im.pixel[p] * PI, 1, 2e-6);
+		}
 		picture_image_free(&im);
 	}
 	stage_free(&t);
@@ -217,6 +219,7 @@ static void test_gathered(void **state)
 	for (size_t i = wall; i < 2 * wall; i++)
 		t.s.irradiance.indirect[2 * i] = t.s.irradiance.indirect[2 * i + 1] = 1;
 	for (double x = -1.8; x < 2; x += .31) {
+		given("x %g", x);
 		double factor = .5 * (1 - (2 - x) / hypot(2 - x, 50));
 		double got = look(&t, VIEW_GATHER, x - .1, .3, 1, x, .3, 0);
 		assert_near(got, .5 / PI * factor, .02 * .5 / PI * factor);
@@ -253,6 +256,7 @@ static void test_target(void **state)
 	assert_that(some.rays, >=, 4 * PIXELS);
 	double off = 0, stated = 0;
 	for (size_t i = 0; i < PIXELS; i++) {
+		given("i %zu", i);
 		double d = (double)(picture_image_plane(&a, 0)[i] - picture_image_plane(&b, 0)[i]);
 		double s = (double)picture_image_plane(&a, 3)[i];
 		off += d * d;

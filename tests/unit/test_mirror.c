@@ -107,6 +107,7 @@ static void corner(void **state)
 	assert_true(r.ways.images.complete);
 	for (double x = .3; x < 4; x += .37)
 		for (double y = .21; y < 4; y += .43) {
+			given("x %g, y %g", x, y);
 			double want = from_point(x - 1, y - 2, 1) +
 			              rho * (from_point(x + 1, y - 2, 1) + from_point(x - 1, y + 2, 1)) +
 			              rho * rho * from_point(x + 1, y + 2, 1);

@@ -193,9 +193,12 @@ static void test_furnace(void **state)
 	ready(&s);
 	run_particles(&s, 100000, &h);
 	for (size_t patch = 0; patch < 6; patch++)
-		for (int b = 0; b < 3; b++)
+		for (int b = 0; b < 3; b++) {
+			given("patch %zu, b %d", patch, b);
 			check_patch(&s, &h, patch, FRONT, b, 1 / (1 - rho[b]));
+		}
 	for (int b = 0; b < 3; b++) {
+		given("b %d", b);
 		assert_near(h.emitted[b], 6, 1e-12);
 		assert_that(h.escaped[b], ==, 0);
 		for (size_t e = 0; e < s.m.element.n; e++)
@@ -203,6 +206,7 @@ static void test_furnace(void **state)
 	}
 	take_picture(&s, inside, corner, 0, 64, &im);
 	for (int b = 0; b < 3; b++) {
+		given("band %s", name[b]);
 		double mean = picture_mean(&im, name[b], &error);
 		check(name[b], mean, 1 / (1 - rho[b]) / pi, error, 0);
 		assert_that(error, <, .02 * mean);
@@ -231,8 +235,10 @@ static void test_furnace_mirror_mix(void **state)
 	}
 	ready(&s);
 	run_particles(&s, 100000, &h);
-	for (size_t patch = 0; patch < 6; patch++)
+	for (size_t patch = 0; patch < 6; patch++) {
+		given("patch %zu", patch);
 		check_patch(&s, &h, patch, FRONT, 0, 1);
+	}
 	check_picture(&s, inside, corner, 0, 64, 1 / pi, 0);
 	pathtrace_irradiance_free(&h);
 	done(&s);
@@ -256,9 +262,12 @@ static void test_isolated(void **state)
 	emit(&s.m, 1, FRONT, 1);
 	ready(&s);
 	run_particles(&s, 200000, &h);
-	for (size_t patch = 6; patch < 12; patch++)
+	for (size_t patch = 6; patch < 12; patch++) {
+		given("patch %zu", patch);
 		check_patch(&s, &h, patch, FRONT, 0, 2);
+	}
 	for (size_t e = 0; e < s.m.element.n; e++) {
+		given("e %zu", e);
 		double one = h.emitted[0] / 200000 / s.m.element.area[e];
 		assert_that(h.h[2 * e + BACK], ==, 0);
 		assert_near(h.error[2 * e + BACK] / one, 1, 1e-12);
@@ -405,6 +414,7 @@ static void test_partition(void **state)
 
 	(void)state;
 	for (int i = 0; i < 3; i++) {
+		given("exponent %g", exponent[i]);
 		struct pathtrace_irradiance h;
 		struct scene s;
 		plates(&s, exponent[i]);
@@ -467,6 +477,7 @@ static void test_one_sided(void **state)
 
 	(void)state;
 	for (int one_sided = 0; one_sided < 2; one_sided++) {
+		given("one_sided %d", one_sided);
 		grid_new(&s.m, 7, 1, 2, 1);
 		unit_cube(&s, material, 1);
 		quad(&s, 1, -1, -1, 2, 3, 3);
@@ -534,6 +545,7 @@ static void test_standard_error(void **state)
 	emit(&s.m, 0, FRONT, 1);
 	ready(&s);
 	for (int i = 0; i < RUNS; i++) {
+		given("i %d", i);
 		struct pathtrace_options o = { .samples = 10000, .seed = 100 + (uint64_t)i,
 			.threads = 1 };
 		struct pathtrace_irradiance h;
@@ -566,6 +578,7 @@ static void test_threads(void **state)
 	assert_int_equal(picture_camera_look_at(eye, target, (double[]){ 0, 1, 0 }, 90, &c, &e), 0);
 	assert_int_equal(picture_camera_frame(&c, 15, 11, &f, &e), 0);
 	for (int i = 0; i < 2; i++) {
+		given("i %d", i);
 		struct pathtrace_options o = { .samples = 333, .seed = 7, .threads = 1 + 2 * i };
 		double relative;
 		assert_int_equal(pathtrace_particles(s.p, &o, NULL, &h[i], &e), 0);

@@ -47,6 +47,7 @@ static void test_point_small_and_far(void **state)
 
 	(void)state;
 	for (double c = 1e-3; c < 2e3; c *= 10) {
+		given("c %g", c);
 		const double v[] = { 0, 0, c, 0, 1, c, 1, 1, c, 1, 0, c };
 		double p = 1 / hypot(1, c), exact = p * atan(p) / pi;
 		/* The terms of far polygons cancel: absolute to rounding. */
@@ -106,6 +107,7 @@ static void test_perpendicular(void **state)
 	for (int i = 0; i < 5; i++)
 		for (int j = 0; j < 6; j++)
 			for (double top = 1e-3; top < 20; top *= 10) {
+				given("i %d, j %d, top %g", i, j, top);
 				const double z[2] = { from, top };
 				double exact = perpendicular(x[i], y[0], y[j], z);
 				assert_near(perpendicular_contour(x[i], y[0], y[j], z), exact,
@@ -139,6 +141,7 @@ static void test_nearly_parallel(void **state)
 
 	(void)state;
 	for (double angle = 1e-6; angle > 5e-17; angle /= 10) {
+		given("angle %g", angle);
 		double b[12];
 		for (int i = 0; i < 4; i++) {
 			double x = i > 1 ? .5 : -.5, y = i == 1 || i == 2 ? .5 : -.5;
@@ -157,6 +160,7 @@ static void test_both_ways(void **state)
 
 	(void)state;
 	for (int k = 0; k < 50; k++) {
+		given("k %d", k);
 		double a[9], b[9], turned[9];
 		for (int i = 0; i < 9; i++) {
 			a[i] = roll(&d, 0, 1) * (i % 3 != 2);
@@ -249,6 +253,7 @@ static void test_cubature_weights(void **state)
 
 	(void)state;
 	for (int n = 3; n <= FACET_CORNERS; n++) {
+		given("n %d", n);
 		double v[FACET_CORNERS * 3], a = roll(&d, .3, 1), b = roll(&d, .3, 1);
 		for (int i = 0; i < n; i++) {
 			v[3 * i] = a * cos(2 * pi * i / n);
@@ -406,6 +411,7 @@ static void test_clear(void **state)
 
 	(void)state;
 	for (int t = 0; t < 2; t++) {
+		given("tolerance %g", relative[t]);
 		geo_unoccluded_init(&c, relative[t]);
 		for (int pair = 0; pair < 3000; pair++) {
 			double v[12], w[12], at[3], size = exp(roll(&d, -6, 0)), gap = exp(roll(&d, -4, 2));
@@ -446,6 +452,7 @@ static void test_facet_parts(void **state)
 
 	(void)state;
 	for (int k = 0; k < 2000; k++) {
+		given("k %d", k);
 		int n = roll_int(&d, 3, FACET_CORNERS - 2);
 		double v[FACET_CORNERS * 3], frame[3][3], plane[3][3], a = roll(&d, .01, 1);
 		roll_frame(&d, 0, frame);
@@ -499,6 +506,7 @@ static void test_edge_divide(void **state)
 
 	(void)state;
 	for (int i = 0; i < 1000; i++) {
+		given("i %d", i);
 		double a[3], b[3], p[3], q[3], ha = roll(&d, 1e-9, 1), hb = -roll(&d, 1e-9, 1);
 		for (int k = 0; k < 3; k++) {
 			a[k] = roll(&d, -1, 1);

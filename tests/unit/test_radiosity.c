@@ -156,6 +156,7 @@ static void six_bands(void **state)
 	solved_finish(&x, 1e-9);
 	for (size_t i = 0; i < 2 * m.element.n; i++)
 		for (int k = 1; k < 6; k++) {
+			given("i %zu, k %d", i, k);
 			double h = (k + 1) * solution_irradiance(&x.s, i, 0);
 			double e = (k + 1) * x.s.error.sampling[6 * i];
 			assert_near(solution_irradiance(&x.s, i, k), h, 1e-12 * h);

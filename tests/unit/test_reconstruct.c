@@ -61,6 +61,7 @@ static void test_constant(void **state)
 	(void)state;
 
 	for (size_t n = 1; n < 6; n++) {
+		given("n %zu", n);
 		grid_new(&m, 1, n, 1, 3);
 		grid_quad(&m, n, 0, origin, x1, y1);
 		grid_end(&m);
@@ -82,6 +83,7 @@ static void test_linear(void **state)
 	(void)state;
 
 	for (size_t n = 3; n < 9; n++) {
+		given("n %zu", n);
 		grid_new(&m, 1, n, 1, 1);
 		grid_quad(&m, n, 0, origin, x1, y1);
 		grid_end(&m);
@@ -146,6 +148,7 @@ static void test_never_negative(void **state)
 		s.irradiance.indirect[2 * e] = m.vertex[3 * (size_t)m.element.corner[3 * e]] < .5 ? 0 : 1;
 	run(&m, &s, 1, &r);
 	for (size_t c = 0; c < 3 * m.element.n; c++) {
+		given("c %zu", c);
 		double v = corner(&r, c / 3, c % 3);
 		double x = m.vertex[3 * (size_t)m.element.corner[c]];
 		assert_that(v, >=, 0);
@@ -217,8 +220,10 @@ static void test_surfaces_and_rooms(void **state)
 	for (size_t e = 0; e < m.element.n / 2; e++)
 		s.irradiance.indirect[2 * e] = 5;
 	run(&m, &s, 1, &r);
-	for (size_t c = 0; c < 3 * m.element.n; c++) /* the dark room stays dark */
+	for (size_t c = 0; c < 3 * m.element.n; c++) /* the dark room stays dark */ {
+		given("c %zu", c);
 		assert_that(corner(&r, c / 3, c % 3), ==, (c / 3 < m.element.n / 2 ? 5 : 0));
+	}
 	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);
@@ -346,8 +351,10 @@ static void test_fan(void **state)
 	grid_end(&m);
 	grid_solution(&m, 3, &s);
 	run(&m, &s, 1, &r);
-	for (size_t i = 0; i < 6 * m.element.n; i++)
+	for (size_t i = 0; i < 6 * m.element.n; i++) {
+		given("i %zu", i);
 		assert_near((double)r.corner[i], 3, 1e-6);
+	}
 	interp_reconstruction_free(&r);
 	grid_solution_free(&s);
 	model_free(&m);

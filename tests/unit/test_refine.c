@@ -130,6 +130,7 @@ static void test_conforming(void **state)
 	assert_that(f.m.element.n, >, f.old.element.n);
 	check_origins(&f);
 	for (size_t e = 0; e < f.m.element.n; e++) {
+		given("e %zu", e);
 		uint32_t o = f.origin[e];
 		double l = longest(&f.m, e);
 		assert_that(l, <=, longest(&f.old, o));
@@ -152,6 +153,7 @@ static void test_elsewhere(void **state)
 	(void)state;
 	refine(&f, make_cube, .25, at, .1);
 	for (size_t e = 0; e < f.m.element.n; e++) {
+		given("e %zu", e);
 		double c[3];
 		centroid(&f.m, e, c);
 		v3_sub(c, at, c);
@@ -175,8 +177,10 @@ static void test_nothing_to_do(void **state)
 	assert_int_equal(f.r.marked, 0);
 	assert_int_equal(f.m.element.n, f.old.element.n);
 	assert_int_equal(f.m.patch.n, f.old.patch.n);
-	for (size_t i = 0; i < f.m.element.n; i++)
+	for (size_t i = 0; i < f.m.element.n; i++) {
+		given("i %zu", i);
 		assert_int_equal(f.origin[i], i);
+	}
 	assert_memory_equal(f.m.vertex, f.old.vertex, 3 * f.m.vertices * sizeof(double));
 	release(&f);
 }
@@ -219,6 +223,7 @@ static void test_patches(void **state)
 	assert_that(f.r.marked, ==, 0);
 	assert_that(f.m.patch.n, >, f.old.patch.n);
 	for (uint32_t p = 0; p < f.m.patch.n; p++) {
+		given("p %u", p);
 		int border = 0;
 		for (size_t i = 3 * (size_t)f.m.patch.start[p];
 		     i < 3 * (size_t)f.m.patch.start[p + 1]; i++)

@@ -47,6 +47,7 @@ static void samples(void **state)
 
 	(void)state;
 	for (int t = 0; t < TRIANGLES; t++) {
+		given("t %d", t);
 		const double (*v)[3] = triangle[t];
 		double angle = geo_solid_angle(v[0], x), sum[3] = { 0 }, want[3], normal[3];
 		v3_area(v[0], v[1], v[2], normal);

@@ -44,10 +44,13 @@ static void test_black(void **state)
 	assert_int_equal(picture_canvas_new(&c, 8, 8, &e), 0);
 	for (curve.compress = 0; curve.compress < 2; curve.compress++) {
 		assert_int_equal(picture_tonemap_curve(&im, rgb, &curve, &c), 0);
-		for (int i = 0; i < 3 * 64; i++)
+		for (int i = 0; i < 3 * 64; i++) {
+			given("i %d", i);
 			assert_that(c.rgb[i], ==, 0);
+		}
 	}
 	for (int logarithmic = 0; logarithmic < 2; logarithmic++) {
+		given("logarithmic %d", logarithmic);
 		struct tone_scale s = { NAN, NAN, logarithmic };
 
 		assert_int_equal(picture_tonemap_scale(&im, rgb, &s, &e), 0);
@@ -67,6 +70,7 @@ static void test_exposure(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof levels / sizeof *levels; i++) {
+		given("level %g", (double)levels[i]);
 		grey_image(&im, 10, 10, levels[i]);
 		assert_near(picture_tonemap_exposure(&im, rgb, &lit), log2(.18 / levels[i]), .01);
 		/* Lamps, black and broken pixels do not matter. */
@@ -128,6 +132,7 @@ static void test_colours(void **state)
 
 	(void)state;
 	for (int i = 0; i <= 1000; i++) {
+		given("i %d", i);
 		picture_tonemap_colour(i / 1000., c);
 		double l = .299 * (double)c[0] + .587 * (double)c[1] + .114 * (double)c[2];
 		for (int k = 0; k < 3; k++)
@@ -228,6 +233,7 @@ static void test_legend(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof scales / sizeof *scales; i++) {
+		given("i %zu", i);
 		check_legend(&scales[i], 1, 1);
 		check_legend(&scales[i], 64, 48);
 		check_legend(&scales[i], 3, 480);

@@ -78,6 +78,7 @@ static void test_matrix_of_patches(void **state)
 	assert_int_equal(ff_patch_matrix_init(&a, &elements, &s, &e), 0);
 	assert_int_equal(ff_patch_matrix_init(&b, &patches, &s, &e), 0);
 	for (size_t i = 0; i < 3; i++) {
+		given("i %zu", i);
 		ff_patch_matrix_row(&a, i, row[0], &black[0], &escape[0]);
 		ff_patch_matrix_row(&b, i, row[1], &black[1], &escape[1]);
 		assert_memory_equal(row[0], row[1], sizeof row[0]);

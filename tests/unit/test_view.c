@@ -41,6 +41,7 @@ static void test_furnace(void **state)
 	o.depth = 60;
 	o.cutoff = 1e-9;
 	for (int i = 0; i < 2; i++) {
+		given("exponent %g", exponent[i]);
 		struct stage t;
 		struct image im;
 		furnace(&t, exponent[i]);
@@ -62,6 +63,7 @@ static void test_cut_bound(void **state)
 
 	furnace(&t, (double)INFINITY);
 	for (int i = 0; i < 5; i++) {
+		given("i %d", i);
 		struct view_options o = options();
 		struct image im;
 		o.depth = i < 4 ? i : 32;
@@ -93,16 +95,20 @@ static void test_layers(void **state)
 		"emission.B", "Z", "N.X", "N.Y", "N.Z", "element", "patch", "error.R", "error.G",
 		"error.B" };
 	assert_int_equal(im.channels, 21);
-	for (int c = 0; c < 21; c++)
+	for (int c = 0; c < 21; c++) {
+		given("c %d", c);
 		assert_string_equal(im.name[c], name[c]);
+	}
 	for (size_t p = 0; p < 24 * 20; p++)
 		for (int c = 0; c < 3; c++) {
+			given("p %zu, c %d", p, c);
 			float sum = picture_image_plane(&im, 3 + c)[p] + picture_image_plane(&im, 6 + c)[p] +
 			            picture_image_plane(&im, 9 + c)[p];
 			assert_that(fabsf(sum - picture_image_plane(&im, c)[p]), <, 1e-6f);
 		}
 	for (size_t j = 0; j < 20; j++)
 		for (size_t i = 0; i < 24; i++) {
+			given("j %zu, i %zu", j, i);
 			double org[3], dir[3], n[3], x[3];
 			size_t p = j * 24 + i, element = (size_t)picture_image_plane(&im, 16)[p];
 			picture_camera_ray(&f, (double)i + .5, (double)j + .5, org, dir);
@@ -132,8 +138,10 @@ static void test_layer_names(void **state)
 	assert_int_equal(view_parse_layers("all", &l), 0);
 	assert_int_equal(l, VIEW_ALL);
 	static const char *const wrong[] = { "", "z", "Z,", ",Z", "Z,,N", "diff", "diffuse.R" };
-	for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
+	for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+		given("layers %s", wrong[i]);
 		assert_int_equal(view_parse_layers(wrong[i], &l), -1);
+	}
 }
 
 static void test_threads(void **state)
@@ -219,6 +227,7 @@ static void test_background_and_bands(void **state)
 	(void)state;
 
 	for (int bands = 1; bands <= 5; bands++) {
+		given("bands %d", bands);
 		struct stage t = { 0 };
 		struct image im;
 		struct view_frame f = frame(0, 0, 2, .01, 0, 0, 9, 9);

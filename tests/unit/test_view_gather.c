@@ -43,6 +43,7 @@ static void test_tails(void **state)
 	o.gather_rays = 1024;
 	o.cutoff = 0;
 	for (int i = 0; i < 4; i++) {
+		given("i %d", i);
 		double rho_s = i % 2 ? .8 : 0, tau_s = i / 2 ? .5 : 0, mean = 0, worst = 0;
 		struct stage t;
 		struct image im;
@@ -73,6 +74,7 @@ static void test_errors(void **state)
 	o.gather_rays = 4096;
 	o.layers = VIEW_ERROR;
 	for (size_t n = 4; n <= 16; n *= 2) {
+		given("n %zu", n);
 		struct stage t;
 		struct image im;
 		double stated = 0, off = 0;

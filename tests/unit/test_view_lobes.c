@@ -19,6 +19,7 @@ static void test_lobes(void **state)
 	(void)state;
 
 	for (int kind = 0; kind < 2; kind++) {
+		given("kind %d", kind);
 		struct stage t;
 		struct view_options o = options();
 		wall(&t, kind ? LOBE_RECIPROCAL : LOBE_PAPER);
@@ -102,6 +103,7 @@ static void test_lamp_in_lobe(void **state)
 	v3_normalise(out);
 	for (int kind = 0; kind < 2; kind++)
 		for (double k = 0; k < 2e4; k = 3 * k + 2) {
+			given("kind %d, k %g", kind, k);
 			struct stage t;
 			struct view_options o = options();
 			gloss(&t, kind ? LOBE_RECIPROCAL : LOBE_PAPER, k, 1, 7);
@@ -123,6 +125,7 @@ static void test_image_in_lobe(void **state)
 	v3_normalise(out);
 	for (int pane = 0; pane < 2; pane++)
 		for (double k = 3; k < 2e4; k *= 20) {
+			given("pane %d, k %g", pane, k);
 			double floor[3] = { -3, -3, 0 }, x[3] = { 6, 0, 0 }, y[3] = { 0, 6, 0 };
 			double lamp[3] = { 2, -.5, pane ? 5 : 1 }, lx[3] = { 1, 0, 0 }, ly[3] = { 0, 1, 0 };
 			double over[3] = { -9, -9, pane ? .9 : 3 }, ox[3] = { 0, 18, 0 }, oy[3] = { 18, 0, 0 };
@@ -181,6 +184,7 @@ static void test_lobe_errors(void **state)
 
 	for (double k = 3; k < 500; k *= 8)
 		for (int i = 0; i < 5; i++) {
+			given("k %g, i %d", k, i);
 			struct stage t;
 			gloss(&t, LOBE_PAPER, k, 40, 0);
 			compare(&t, samples[i], &stated, &off, &all);
