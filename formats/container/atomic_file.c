@@ -156,11 +156,6 @@ int file_atomic_write(struct atomic_file *f, const void *data, size_t bytes, str
 	return 0;
 }
 
-int file_atomic_descriptor(const struct atomic_file *f)
-{
-	return f->fd;
-}
-
 int file_atomic_direct(const struct atomic_file *f)
 {
 	return f->temporary == NULL;

@@ -20,9 +20,7 @@ struct atomic_file *file_atomic_create(const char *path, struct err *e);
 /* Appends. 0, or -1 and e; after a failure only abandon is left. */
 int file_atomic_write(struct atomic_file *f, const void *data, size_t bytes, struct err *e);
 
-/* The descriptor, for callers that write by themselves. It cannot be sought in
- * where file_atomic_direct() is true. */
-int file_atomic_descriptor(const struct atomic_file *f);
+/* 1 if bytes go to the target as they come, which cannot be sought in. */
 int file_atomic_direct(const struct atomic_file *f);
 
 /* fsyncs and renames, so that the path holds the new bytes. Frees f in any case. */

@@ -147,7 +147,6 @@ int gltf_load_data_uri(const char *uri, size_t bytes, unsigned char **data, size
 #ifdef __cplusplus
 }
 #endif
-void gltf_doc_free(struct gltf_doc *d);
 
 /* ---- gltf_check.c ---- */
 /* Cameras of JSON that the schema accepts. */

@@ -5,7 +5,7 @@
 
 #include "formats/gltf/gltf_doc.h"
 
-void gltf_doc_free(struct gltf_doc *d)
+static void gltf_doc_free(struct gltf_doc *d)
 {
 	free(d->view);
 	free(d->accessor);

@@ -23,7 +23,6 @@ struct gltf_report {
 	char **note;            /* each a line without newline, no two the same */
 	char digest[33];        /* XXH3-128 of the file and its external buffers */
 	size_t nodes;           /* of the scene that was read */
-	size_t instances;       /* nodes with a mesh */
 	size_t skipped;         /* primitives of points and lines */
 };
 

@@ -239,7 +239,6 @@ static int count(struct scene *s, size_t *surfaces, size_t *triangles)
 		s->m->cameras += d->node[i].camera != GLTF_NONE;
 		if (d->node[i].mesh == GLTF_NONE)
 			continue;
-		r->instances++;
 		const struct gltf_mesh *mesh = &d->mesh[d->node[i].mesh];
 		for (size_t k = 0; k < mesh->primitives; k++) {
 			const struct gltf_primitive *p = &d->primitive[mesh->primitive + k];

@@ -60,13 +60,10 @@ int file_exr_write(const char *path, const struct image *im, const struct exr_fi
 int file_exr_read(const char *path, struct image *im, struct exr_file_info *info,
                   struct err *e);
 
-/* Reads the attributes alone; for scanline files it is also checked that the last
- * rows are there. Cost independent of the number of pixels but for a table of
- * 8 bytes per 16 rows. */
-int file_exr_read_info(const char *path, struct exr_file_info *info, struct err *e);
-
 /* 1 if `path` is a picture whose attribute EXR_FILE_KEY is `key`: then the file is
- * touched (mtime now). */
+ * touched (mtime now). Pixels are not read, but for scanline files it is checked that the
+ * last rows are there: its cost is independent of the number of pixels but for a table of
+ * 8 bytes per 16 rows. */
 int file_exr_up_to_date(const char *path, const char *key);
 
 #endif

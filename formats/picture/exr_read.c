@@ -382,26 +382,17 @@ int file_exr_read(const char *path, struct image *im, struct exr_file_info *info
 	return -1;
 }
 
-int file_exr_read_info(const char *path, struct exr_file_info *info, struct err *e)
-{
-	*info = (struct exr_file_info){ 0 };
-	if (read_file(path, NULL, info, e) == 0)
-		return 0;
-	file_exr_info_free(info);
-	return -1;
-}
-
 int file_exr_up_to_date(const char *path, const char *key)
 {
 	struct exr_file_info info = { 0 };
 	struct err ignored = { 0 };
 	struct stat st;
 
-	if (strcmp(path, "-") == 0 || stat(path, &st) || !S_ISREG(st.st_mode) ||
-	    file_exr_read_info(path, &info, &ignored))
+	if (strcmp(path, "-") == 0 || stat(path, &st) || !S_ISREG(st.st_mode))
 		return 0;
+	int bad = read_file(path, NULL, &info, &ignored);
 	const char *has = file_exr_info_get(&info, EXR_FILE_KEY);
-	int same = has && strcmp(has, key) == 0;
+	int same = !bad && has && strcmp(has, key) == 0;
 	file_exr_info_free(&info);
 	return same && utimensat(AT_FDCWD, path, NULL, 0) == 0;
 }

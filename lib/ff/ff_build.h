@@ -56,7 +56,6 @@ struct ff_stats {
 	size_t sides, curved; /* analytic: modelled patch-sides; those no formula is for */
 	int directional;      /* analytic to patches: lobes, mirrors or panes need rays */
 	double cut;           /* largest fraction of a row cut at the depth limit */
-	double trace_seconds; /* filled in by the caller */
 };
 
 /* Receives batches in patch order. */

@@ -292,7 +292,9 @@ static int element_takes(const struct ff_job *j, uint32_t ps, uint32_t column)
 	             j->m->element.area[column >> 1], ff_reciprocal_rays(j, column >> 1));
 }
 
-int ff_row_is_of_emitter(const struct ff_job *j, uint32_t ps)
+/* 1 if the row of a patch-side is made with point pairs (ff_emitter_row): an emitter's, unless
+ * looking at every element costs more than the row's rays. */
+static int ff_row_is_of_emitter(const struct ff_job *j, uint32_t ps)
 {
 	return is_by_formula(j, ps) ||
 	       (j->emits[ps] &&

@@ -12,10 +12,6 @@ int ff_reciprocal_cast(struct ff_job *j, double *rays, const struct progress *pr
                        struct err *e);
 void ff_reciprocal_free(struct ff_reciprocal *g);
 
-/* 1 if the row of a patch-side is made with point pairs (ff_emitter_row): an emitter's, unless
- * looking at every element costs more than the row's rays. */
-int ff_row_is_of_emitter(const struct ff_job *j, uint32_t patch_side);
-
 /* 1 if the row of a patch-side needs no rays of its own. */
 int ff_row_is_reciprocal(const struct ff_job *j, uint32_t patch_side);
 

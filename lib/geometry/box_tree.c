@@ -12,7 +12,8 @@ struct place {
 	uint32_t triangle;
 };
 
-struct box geo_triangle_box(const double *vertex, const uint32_t *corner)
+/* The box of a triangle's corners (rows of vertex). */
+static struct box geo_triangle_box(const double *vertex, const uint32_t *corner)
 {
 	struct box b;
 

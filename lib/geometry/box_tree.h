@@ -27,9 +27,6 @@ struct boxes {
 	struct boxes_node *node;  /* depth first */
 };
 
-/* The box of a triangle's corners (rows of vertex). */
-struct box geo_triangle_box(const double *vertex, const uint32_t *corner);
-
 /* O(n log n). 0, or -1 and e; to be freed in any case. */
 int geo_boxes_build(struct boxes *b, const double *vertex, const uint32_t *triangle, size_t n,
                     struct err *e);

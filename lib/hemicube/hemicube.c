@@ -171,31 +171,3 @@ void ff_hemicube_free(struct hemicube *h)
 	free(h->work);
 	*h = (struct hemicube){ 0 };
 }
-
-double ff_hemicube_sum(const struct hemicube *h, double *f)
-{
-	const double *delta = h->grid->delta;
-	size_t pixels = h->grid->pixels;
-	double unseen = 0;
-
-	for (size_t i = 0; i < pixels;) {
-		uint32_t item = h->item[i];
-		double sum = 0;
-		do
-			sum += delta[i++];
-		while (i < pixels && h->item[i] == item);
-		if (item == HEMICUBE_VOID)
-			unseen += sum;
-		else
-			f[item] += sum;
-	}
-	return unseen;
-}
-
-double ff_hemicube_distance(const struct hemicube *h, size_t i)
-{
-	const double *d = &h->grid->direction[3 * i];
-
-	/* The face's axis is the largest coordinate. */
-	return 1 / ((double)h->depth[i] * fmax(fmax(fabs(d[0]), fabs(d[1])), d[2]));
-}

@@ -72,11 +72,4 @@ void ff_hemicube_free(struct hemicube *h);
 void ff_hemicube_render(struct hemicube *h, const struct hemicube_scene *s, const double eye[3],
                         const double frame[3][3], uint32_t own);
 
-/* Adds the delta form factors of all pixels to f[item], f[2 elements], and
- * returns the sum of those that see nothing. */
-double ff_hemicube_sum(const struct hemicube *h, double *f);
-
-/* Distance from the eye to what pixel i sees along its direction. */
-double ff_hemicube_distance(const struct hemicube *h, size_t i);
-
 #endif

@@ -216,8 +216,9 @@ static void shrink(double **a, size_t n)
 		*a = p;
 }
 
-int ff_hemicube_mesh_init(struct hemicube_mesh *s, const struct model *m, const uint32_t *corner, size_t n,
-                          struct err *e)
+/* Triangles corner[n][3] of m's vertices. 0, or -1 and e; free either way. */
+static int ff_hemicube_mesh_init(struct hemicube_mesh *s, const struct model *m, const uint32_t *corner,
+                                 size_t n, struct err *e)
 {
 	struct builder b = { .m = m, .s = s, .corner = corner };
 	int bad;
@@ -239,7 +240,7 @@ int ff_hemicube_mesh_init(struct hemicube_mesh *s, const struct model *m, const 
 	return bad;
 }
 
-void ff_hemicube_mesh_free(struct hemicube_mesh *s)
+static void ff_hemicube_mesh_free(struct hemicube_mesh *s)
 {
 	free(s->cluster);
 	free(s->split);

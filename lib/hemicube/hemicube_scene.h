@@ -40,11 +40,6 @@ struct hemicube_mesh {
 	double horizon;            /* heights up to this are rounding of coordinates */
 };
 
-/* Triangles corner[n][3] of m's vertices. 0, or -1 and e; free either way. */
-int ff_hemicube_mesh_init(struct hemicube_mesh *s, const struct model *m, const uint32_t *corner, size_t n,
-                          struct err *e);
-void ff_hemicube_mesh_free(struct hemicube_mesh *s);
-
 /* A model to be drawn by its elements or, where these are many more, by the input
  * triangles, with the elements found pixel by pixel afterwards. */
 struct hemicube_scene {

@@ -5,8 +5,6 @@
 #include "lib/base/vec3.h"
 #include "lib/mesh/imprint.h"
 
-#define NONE UINT32_MAX
-
 /* The triangles to be, by the input triangle they are part of. */
 struct parts {
 	size_t n;

@@ -29,7 +29,7 @@ struct mesh_options {
 };
 
 #define MESHER_OPTIONS_DEFAULT \
-	((struct mesher_options){ .patch = { .05, 1 }, .element = { .04, 1 }, \
+	((struct mesh_options){ .patch = { .05, 1 }, .element = { .04, 1 }, \
 	                          .element_within_patch = 1, .normal_cone = 20 })
 
 /* Refinement goes on until the expected error is small enough, or the elements are so many

@@ -52,7 +52,6 @@ struct direct_worker {
 	double *weight;               /* [emitters] cumulated, of sampled ones */
 	struct visible_point visible;
 	struct shaft shaft;
-	uint64_t rays;
 };
 
 /* ---- what all points share ---- */
@@ -111,11 +110,6 @@ void occ_direct_worker_free(struct direct_worker *w)
 int occ_direct_exact(const struct direct *d)
 {
 	return d->exact;
-}
-
-uint64_t occ_direct_rays(const struct direct_worker *w)
-{
-	return w->rays;
 }
 
 /* ---- what stands between a side and the emitters ---- */
@@ -362,7 +356,6 @@ static int clear_line(struct direct_worker *w, const double x[3], const double y
 	v3_mad(y, 1, w->d->centre, to);
 	ray_leave(w->d->rays, w->normal, from);
 	ray_leave(w->d->rays, t->f.normal, to);
-	w->rays++;
 	return !ray_blocked(w->d->rays, from, to);
 }
 
@@ -459,7 +452,6 @@ static void add_lights(struct direct_worker *w, const double world[3], double *h
 		double scale = v3_dot(w->normal, s.toward) * s.across * s.falloff;
 		if (!(scale > 0))
 			continue;
-		w->rays++;
 		if (ray_blocked(w->d->rays, from, s.to))
 			continue;
 		for (int b = 0; b < m->bands; b++)

@@ -61,7 +61,4 @@ int occ_direct_weighted(struct direct_worker *w, const double x[3], const struct
 /* 1 if emitters are few enough to be looked at one by one. */
 int occ_direct_exact(const struct direct *d);
 
-/* Shadow rays traced so far. */
-uint64_t occ_direct_rays(const struct direct_worker *w);
-
 #endif

@@ -21,7 +21,11 @@ static double unit(double x)
 	return fmin(fmax(x, 0), 1);
 }
 
-double bsdf_lobe_exponent(double roughness)
+/* Phong exponent about the mirror direction for a microfacet roughness r: the
+ * half-vector exponent 2/r^4 - 2 of Beckmann width r^2 (Walter et al. 2007, with
+ * glTF's alpha = r^2), a quarter of it about R, as the angle to R is about twice
+ * the angle of the half vector to n (Phong against Blinn-Phong). 0 gives INFINITY. */
+static double bsdf_lobe_exponent(double roughness)
 {
 	double r2 = unit(roughness) * unit(roughness);
 

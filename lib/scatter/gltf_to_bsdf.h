@@ -40,12 +40,6 @@ struct bsdf_folding {
 	double exponent;                           /* of both lobes before folding */
 };
 
-/* Phong exponent about the mirror direction for a microfacet roughness r: the
- * half-vector exponent 2/r^4 - 2 of Beckmann width r^2 (Walter et al. 2007, with
- * glTF's alpha = r^2), a quarter of it about R, as the angle to R is about twice
- * the angle of the half vector to n (Phong against Blinn-Phong). 0 gives INFINITY. */
-double bsdf_lobe_exponent(double roughness);
-
 /* Three bands of one side (both sides are alike):
  *   rho_s = m c + (1-m) F0, tau_s = (1-m)(1-F0) t c,
  *   (1-m)(1-F0)(1-t) split into tau_d = d c_d and rho_d = (1-d) c,

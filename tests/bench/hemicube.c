@@ -157,12 +157,6 @@ static void turn(const double normal[3], double a, double frame[3][3])
 	}
 }
 
-static void report(const char *what, const char *name, int n, double *ms, size_t count)
-{
-	qsort(ms, count, sizeof *ms, by_value);
-	printf("%s.%s.%d %.3f\n", what, name, n, ms[count / 2]);
-}
-
 static void measure(const char *name, const struct model *m, int n, size_t repeats)
 {
 	struct err e = { 0 };
@@ -170,8 +164,7 @@ static void measure(const char *name, const struct model *m, int n, size_t repea
 	struct hemicube h = { 0 };
 	struct rng r = rng_seed(1, 1);
 	double *render = must(malloc(repeats * sizeof *render)), begun = seconds();
-	double *gather = must(malloc(repeats * sizeof *gather));
-	double *f = must(calloc(2 * m->element.n, sizeof *f)), escape = 0;
+	double escape = 0;
 	struct hemicube_scene *s = ff_hemicube_scene_new(m, &e);
 
 	printf("build_ms.%s %.1f\n", name, 1e3 * (seconds() - begun));
@@ -189,19 +182,16 @@ static void measure(const char *name, const struct model *m, int n, size_t repea
 		turn(normal, 7 * rng_uniform(&r), frame);
 		double t0 = seconds();
 		ff_hemicube_render(&h, s, eye, (const double (*)[3])frame, own);
-		double t1 = seconds();
-		escape += ff_hemicube_sum(&h, f);
-		gather[i] = 1e3 * (seconds() - t1);
-		render[i] = 1e3 * (t1 - t0);
+		render[i] = 1e3 * (seconds() - t0);
+		for (size_t k = 0; k < g.pixels; k++)
+			escape += h.item[k] == HEMICUBE_VOID ? g.delta[k] : 0;
 	}
-	report("render_ms", name, n, render, repeats);
-	report("gather_ms", name, n, gather, repeats);
+	qsort(render, repeats, sizeof *render, by_value);
+	printf("render_ms.%s.%d %.3f\n", name, n, render[repeats / 2]);
 	printf("escape.%s.%d %.3g\n", name, n, escape / (double)repeats);
 	ff_hemicube_free(&h);
 	ff_hemicube_grid_free(&g);
 	ff_hemicube_scene_free(s);
-	free(f);
-	free(gather);
 	free(render);
 }
 

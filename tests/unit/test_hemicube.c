@@ -129,6 +129,26 @@ static void random_frame(struct rng *r, double frame[3][3])
 	frame_about(n, 7 * rng_uniform(r), frame);
 }
 
+/* Adds the form factors of all pixels to f[2 elements]; returns the sum of those that see
+ * nothing. */
+static double factors(const struct stage *s, double *f)
+{
+	double unseen = 0;
+
+	for (size_t i = 0; i < s->grid.pixels; i++)
+		*(s->cube.item[i] == HEMICUBE_VOID ? &unseen : &f[s->cube.item[i]]) += s->grid.delta[i];
+	return unseen;
+}
+
+/* From the eye to what pixel i sees along its direction. */
+static double distance(const struct stage *s, size_t i)
+{
+	const double *d = &s->grid.direction[3 * i];
+
+	/* The face's axis is the largest coordinate. */
+	return 1 / ((double)s->cube.depth[i] * fmax(fmax(fabs(d[0]), fabs(d[1])), d[2]));
+}
+
 static size_t count_void(const struct stage *s)
 {
 	size_t n = 0;
@@ -158,7 +178,7 @@ static double mean_factor(const struct model *m, int n)
 		frame_about(up, .3 + i, frame);
 		draw(&s, eye, frame, HEMICUBE_VOID);
 		memset(f, 0, 2 * m->element.n * sizeof *f);
-		ff_hemicube_sum(&s.cube, f);
+		factors(&s, f);
 		for (size_t k = 0; k < m->element.n; k++) {
 			sum += weight[x % 4] * weight[y % 4] / 4 * f[2 * k + FRONT];
 			back += f[2 * k + BACK];
@@ -213,7 +233,7 @@ static void closed_cube_has_no_holes(void **state)
 			draw(&s, eye, frame, HEMICUBE_VOID);
 			assert_int_equal(count_void(&s), 0);
 			for (size_t p = 0; p < s.grid.pixels; p++) {
-				double d = ff_hemicube_distance(&s.cube, p);
+				double d = distance(&s, p);
 				assert_int_equal(s.cube.item[p] & 1, FRONT);
 				assert_that(d, >, 0);
 				assert_that(d, <, 1.75 * size[k]);
@@ -277,7 +297,7 @@ static void near_sheet_blocks(void **state)
 			double eye[3] = { .1 + .04 * i, .45, 0 }, frame[3][3], seen[8] = { 0 };
 			frame_about(up, i, frame);
 			draw(&s, eye, frame, HEMICUBE_VOID);
-			ff_hemicube_sum(&s.cube, seen);
+			factors(&s, seen);
 			double sheet = seen[0] + seen[1] + seen[2] + seen[3];
 			if (height[k] > 0)
 				assert_true(sheet > 1 - 1e-5 && seen[0] + seen[2] == 0);
@@ -407,7 +427,7 @@ static void aligned_grid(void **state)
 		draw(&s, eye, frame, HEMICUBE_VOID);
 		for (size_t p = 0; p < 64 * 64; p++)
 			assert_int_not_equal(s.cube.item[p], HEMICUBE_VOID);
-		double unseen = ff_hemicube_sum(&s.cube, f);
+		double unseen = factors(&s, f);
 		for (size_t k = 0; k < 2 * m.element.n; k++)
 			sum += f[k];
 		assert_near(sum + unseen, 1, 1e-12);
