@@ -153,7 +153,7 @@ static void make_key(const struct cache_info *mesh, const char *chosen, char key
 {
 	struct digest *d = file_digest_new();
 
-	digest_string(d, "ffcalc " TWOPASS_VERSION " " REVISION_FF);
+	file_digest_string(d, "ffcalc " TWOPASS_VERSION " " REVISION_FF);
 	file_digest_string(d, mesh->geometry_id);
 	file_digest_string(d, chosen);
 	file_digest_end(d, key);

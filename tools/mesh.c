@@ -288,7 +288,7 @@ static char *make_key(const struct job *j)
 	char hex[33];
 	struct digest *d = file_digest_new();
 
-	digest_string(d, "mesh " TWOPASS_VERSION " " CACHE_VERSION " " REVISION_MESH);
+	file_digest_string(d, "mesh " TWOPASS_VERSION " " CACHE_VERSION " " REVISION_MESH);
 	file_digest_string(d, j->info.options);
 	file_digest_string(d, j->gltf.digest);
 	if (j->r->solution)

@@ -120,7 +120,7 @@ static void picture_key(struct reference *r, const char *content)
 	char camera[33];
 
 	file_cache_camera_id(r->view, camera);
-	digest_string(d, "twopass.reference " TWOPASS_VERSION " " REVISION_VIEW);
+	file_digest_string(d, "twopass.reference " TWOPASS_VERSION " " REVISION_VIEW);
 	file_digest_string(d, content);
 	file_digest_string(d, camera);
 	file_digest_bytes(d, number, sizeof number);

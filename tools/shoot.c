@@ -127,7 +127,7 @@ static void make_key(const struct job *j, char key[33])
 	struct digest *d = file_digest_new();
 	const struct model *m = &j->m;
 
-	digest_string(d, "shoot " TWOPASS_VERSION " " REVISION_RAD);
+	file_digest_string(d, "shoot " TWOPASS_VERSION " " REVISION_RAD);
 	file_digest_string(d, j->mesh.geometry_id);
 	file_digest_string(d, j->mesh.material_id);
 	for (size_t i = 0; i < m->surface.n; i++)

@@ -249,7 +249,7 @@ static void picture_key(const struct trace *t, struct shot *s)
 	struct digest *d = file_digest_new();
 
 	file_cache_camera_id(s->camera, camera);
-	digest_string(d, "twopass.exr " TWOPASS_VERSION " " REVISION_VIEW);
+	file_digest_string(d, "twopass.exr " TWOPASS_VERSION " " REVISION_VIEW);
 	file_digest_string(d, t->content);
 	file_digest_string(d, camera);
 	file_digest_bytes(d, number, sizeof number);
