@@ -65,9 +65,9 @@ $(BUILD)/%.o: %.c
 	$(CC) $(CPPFLAGS) $(CFLAGS) -c -o $@ $<
 
 # Loops written to become vector code.
-FAST := ff/ray_samples geometry/cubature_pair geometry/exchange_unoccluded geometry/cubature occlusion/exchange \
+FAST := ff_rays/ray_samples geometry/cubature_pair geometry/exchange_unoccluded geometry/cubature occlusion/exchange \
 	occlusion/shadow_edges occlusion/occluder occlusion/visible_region occlusion/shaft geometry/point_polygon \
-	geometry/facet ff/exchange_matrix ff/ff_batch interpolate/reconstruct interpolate/reconstruct_fit \
+	geometry/facet ff/exchange_matrix ff_tally/ff_batch interpolate/reconstruct interpolate/reconstruct_fit \
 	radiosity/propagate radiosity/truncation_bound radiosity/shoot radiosity/element_irradiance radiosity/gmres
 $(FAST:%=$(BUILD)/lib/%.o): CFLAGS += -O3 -fno-math-errno -fno-trapping-math
 

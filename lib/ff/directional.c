@@ -19,9 +19,9 @@
 #include <string.h>
 
 #include "lib/base/vec3.h"
-#include "lib/ff/ray_follow.h"
-#include "lib/ff/ray_samples.h"
 #include "lib/ff/row_light.h"
+#include "lib/ff_rays/ray_follow.h"
+#include "lib/ff_rays/ray_samples.h"
 #include "lib/scatter/bsdf.h"
 #include "lib/scatter/lobe.h"
 

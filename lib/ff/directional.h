@@ -2,7 +2,7 @@
 #ifndef TWOPASS_DIRECTIONAL_H
 #define TWOPASS_DIRECTIONAL_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/ff_rays/ff_internal.h"
 
 /* Casts one lobe direction from a capture's point off a side. */
 typedef void ff_cast_fn(struct ff_thread *t, const struct ff_incident *c, int side,

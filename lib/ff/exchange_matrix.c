@@ -4,9 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "lib/ff/closure.h"
 #include "lib/ff/ff_stats.h"
 #include "lib/ff/row_remainder.h"
+#include "lib/ff_tally/closure.h"
 #include "lib/occlusion/exchange.h"
 
 enum { BAND_BYTES = 192 << 20, ROWS_AT_A_TIME = 64, TILE = 32, REST_RAYS = 256,

@@ -3,7 +3,8 @@
 #ifndef TWOPASS_EXCHANGE_MATRIX_H
 #define TWOPASS_EXCHANGE_MATRIX_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/ff/ff_build.h"
+#include "lib/ff_rays/ff_internal.h"
 
 /* 1 if a model is all plane patches without lobes, mirrors and panes. */
 int ff_exchange_matrix_can(const struct ff_job *j);

@@ -6,11 +6,11 @@
 #include "lib/ff/exchange_matrix.h"
 #include "lib/ff/ff_job.h"
 #include "lib/ff/ff_stats.h"
-#include "lib/ff/ray_budget.h"
 #include "lib/ff/row_hemicube.h"
 #include "lib/ff/row_light.h"
 #include "lib/ff/row_rays.h"
 #include "lib/ff/row_reciprocal.h"
+#include "lib/ff_rays/ray_budget.h"
 
 enum { PATCHES_AT_A_TIME = 64 };
 

@@ -3,10 +3,10 @@
 
 #include <stdlib.h>
 
-#include "lib/ff/chain_limit.h"
-#include "lib/ff/ray_samples.h"
 #include "lib/ff/row_reciprocal.h"
-#include "lib/ff/sobol_points.h"
+#include "lib/ff_rays/chain_limit.h"
+#include "lib/ff_rays/ray_samples.h"
+#include "lib/ff_rays/sobol_points.h"
 #include "lib/scatter/bsdf.h"
 
 enum { FORMULA_EVALUATIONS = 1000, FORMULA_BODIES = 8 };

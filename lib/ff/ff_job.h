@@ -2,7 +2,7 @@
 #ifndef TWOPASS_FF_JOB_H
 #define TWOPASS_FF_JOB_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/ff_rays/ff_internal.h"
 
 static inline int ff_by_formula(const struct ff_options *o)
 {

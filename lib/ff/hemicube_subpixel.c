@@ -4,7 +4,7 @@
 #include "lib/ff/hemicube_subpixel.h"
 
 #include "lib/base/vec3.h"
-#include "lib/ff/ray_samples.h"
+#include "lib/ff_rays/ray_samples.h"
 
 #define PI 3.14159265358979323846
 

@@ -2,7 +2,7 @@
 #ifndef TWOPASS_HEMICUBE_SUBPIXEL_H
 #define TWOPASS_HEMICUBE_SUBPIXEL_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/ff_rays/ff_internal.h"
 
 /* Shares the light of patch-side ps, whose views are set and whose hemicubes are tallied,
  * anew among elements that few pixels show. O(elements x points) rays. */

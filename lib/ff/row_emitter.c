@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "lib/base/vec3.h"
-#include "lib/ff/ray_samples.h"
+#include "lib/ff_rays/ray_samples.h"
 #include "lib/geometry/solid_angle.h"
 
 #define PI 3.14159265358979323846

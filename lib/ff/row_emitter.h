@@ -2,7 +2,7 @@
 #ifndef TWOPASS_ROW_EMITTER_H
 #define TWOPASS_ROW_EMITTER_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/ff_rays/ff_internal.h"
 
 /* A row of direct sight: t->sights becomes F[source -> element-side] of every
  * element-side that may see the source, with about `rays` rays between them. Returns

@@ -11,8 +11,8 @@
 #include "lib/base/vec3.h"
 #include "lib/ff/directional.h"
 #include "lib/ff/hemicube_subpixel.h"
-#include "lib/ff/ray_follow.h"
-#include "lib/ff/ray_samples.h"
+#include "lib/ff_rays/ray_follow.h"
+#include "lib/ff_rays/ray_samples.h"
 #include "lib/scatter/lobe.h"
 
 enum {

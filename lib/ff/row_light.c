@@ -12,9 +12,9 @@
 
 #include "lib/base/vec3.h"
 #include "lib/data/punctual.h"
-#include "lib/ff/light_paths.h"
-#include "lib/ff/ray_follow.h"
-#include "lib/ff/ray_samples.h"
+#include "lib/ff_rays/light_paths.h"
+#include "lib/ff_rays/ray_follow.h"
+#include "lib/ff_rays/ray_samples.h"
 #include "lib/geometry/solid_angle.h"
 #include "lib/scatter/bsdf.h"
 

@@ -2,7 +2,7 @@
 #ifndef TWOPASS_ROW_LIGHT_H
 #define TWOPASS_ROW_LIGHT_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/ff_rays/ff_internal.h"
 
 /* The row of a punctual light into the batch; none if it has no flux. 0, or -1 and e.
  * O(elements + rays). */

@@ -4,10 +4,10 @@
 
 #include "lib/base/vec3.h"
 #include "lib/ff/directional.h"
-#include "lib/ff/ray_budget.h"
-#include "lib/ff/ray_follow.h"
-#include "lib/ff/ray_samples.h"
 #include "lib/ff/row_reciprocal.h"
+#include "lib/ff_rays/ray_budget.h"
+#include "lib/ff_rays/ray_follow.h"
+#include "lib/ff_rays/ray_samples.h"
 #include "lib/scatter/lobe.h"
 
 static void cast_lobe_ray(struct ff_thread *t, const struct ff_incident *c, int side,

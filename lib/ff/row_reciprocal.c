@@ -11,9 +11,9 @@
 
 #include "lib/base/mem.h"
 #include "lib/base/vec3.h"
-#include "lib/ff/ray_budget.h"
-#include "lib/ff/ray_samples.h"
 #include "lib/ff/row_emitter.h"
+#include "lib/ff_rays/ray_budget.h"
+#include "lib/ff_rays/ray_samples.h"
 
 /* An element's own rays tell what a patch-side sends it, if its area is small beside the
  * patch's, and if of rays between them so many are the element's, beside those that the

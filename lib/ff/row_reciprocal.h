@@ -2,7 +2,8 @@
 #ifndef TWOPASS_ROW_RECIPROCAL_H
 #define TWOPASS_ROW_RECIPROCAL_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/base/parallel.h"
+#include "lib/ff_rays/ff_internal.h"
 
 /* Casts ff_reciprocal_rays rays from every element-side that is modelled and no ideal mirror or
  * pane, jointly stratified over its area and hemisphere, into j->gather; adds to *rays.

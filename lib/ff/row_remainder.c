@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "lib/ff/ray_samples.h"
+#include "lib/ff_rays/ray_samples.h"
 
 int ff_remainder_init(struct ff_rest *r, const struct ff_job *j, struct err *e)
 {

@@ -3,7 +3,7 @@
 #ifndef TWOPASS_ROW_REMAINDER_H
 #define TWOPASS_ROW_REMAINDER_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/ff_rays/ff_internal.h"
 
 /* Landings of rays of a patch-side. */
 struct ff_rest {

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 
 #include "lib/base/rng.h"
-#include "lib/ff/closure.h"
+#include "lib/ff_tally/closure.h"
 #include "tests/unit/fixtures/check.h"
 
 enum { ROWS = 40, PAIRS = ROWS * (ROWS - 1) / 2 };

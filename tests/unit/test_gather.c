@@ -3,8 +3,8 @@
 #include <math.h>
 
 #include "lib/ff/ff_job.h"
-#include "lib/ff/ray_budget.h"
 #include "lib/ff/row_reciprocal.h"
+#include "lib/ff_rays/ray_budget.h"
 #include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/memory_ff.h"
 #include "tests/unit/fixtures/shapes.h"

@@ -1,12 +1,12 @@
 /* How far chains of ideal events are told apart: a few rays are followed to see which
  * chains the scene makes. Two mirrors that face each other make two of each length; a
  * kaleidoscope of many colours makes all that there are. */
-#include "lib/ff/chain_limit.h"
+#include "lib/ff_rays/chain_limit.h"
 
 #include <stdlib.h>
 
-#include "lib/ff/ray_follow.h"
-#include "lib/ff/ray_samples.h"
+#include "lib/ff_rays/ray_follow.h"
+#include "lib/ff_rays/ray_samples.h"
 #include "lib/scatter/lobe.h"
 
 enum {

@@ -1,9 +1,9 @@
 /* Points of samples, shared by all rows: their order. */
-#include "lib/ff/sobol_points.h"
+#include "lib/ff_rays/sobol_points.h"
 
 #include <stdlib.h>
 
-#include "lib/ff/ray_budget.h"
+#include "lib/ff_rays/ray_budget.h"
 
 enum { SOBOL_POINTS_MAX = 1 << 16, GATHER_FEWEST = 32 };
 

@@ -1,12 +1,12 @@
 /* The ways that rays of punctual lights and of their images in plane mirrors take. */
-#include "lib/ff/light_paths.h"
+#include "lib/ff_rays/light_paths.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "lib/base/vec3.h"
 #include "lib/data/punctual.h"
-#include "lib/ff/ray_samples.h"
+#include "lib/ff_rays/ray_samples.h"
 #include "lib/scatter/bsdf.h"
 
 /* A ray's way through clear panes: where it is, and the events passed. */

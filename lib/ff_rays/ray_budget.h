@@ -2,7 +2,7 @@
 #ifndef TWOPASS_RAY_BUDGET_H
 #define TWOPASS_RAY_BUDGET_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/ff_rays/ff_internal.h"
 
 /* How many rays each side of an element gathers with. */
 static inline uint32_t ff_reciprocal_rays(const struct ff_job *j, uint32_t element)

@@ -2,7 +2,7 @@
 #ifndef TWOPASS_RAY_SAMPLES_H
 #define TWOPASS_RAY_SAMPLES_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/ff_rays/ff_internal.h"
 
 /* Fills job->element. O(elements). */
 void ff_element_table(struct ff_job *j);

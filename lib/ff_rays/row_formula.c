@@ -1,4 +1,4 @@
-#include "lib/ff/row_formula.h"
+#include "lib/ff_rays/row_formula.h"
 
 int ff_formula_init(struct ff_formula *f, const struct model *m, int all, struct err *e)
 {

@@ -3,7 +3,7 @@
  * The variance that rows of n rays with fluxes U bring to what they light is the sum of
  * U^2 / n, so that rays are best shared out as fluxes are. What is known of these before
  * anything is solved is where elements, as they gathered, met emitters. */
-#include "lib/ff/ray_budget.h"
+#include "lib/ff_rays/ray_budget.h"
 
 #include <stdlib.h>
 

@@ -2,7 +2,7 @@
 #ifndef TWOPASS_SOBOL_POINTS_H
 #define TWOPASS_SOBOL_POINTS_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/ff_rays/ff_internal.h"
 
 /* Fills job->of_rows, of_gathering, of_small. O(points log points). 0, or -1 and e. */
 int ff_sobol_points(struct ff_job *j, struct err *e);

@@ -1,4 +1,4 @@
-#include "lib/ff/ff_batch.h"
+#include "lib/ff_tally/ff_batch.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "lib/ff/closure.h"
+#include "lib/ff_tally/closure.h"
 
 #include <math.h>
 #include <stdlib.h>

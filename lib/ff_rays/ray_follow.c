@@ -1,9 +1,9 @@
-#include "lib/ff/ray_follow.h"
+#include "lib/ff_rays/ray_follow.h"
 
 #include <string.h>
 
 #include "lib/base/vec3.h"
-#include "lib/ff/ray_samples.h"
+#include "lib/ff_rays/ray_samples.h"
 #include "lib/scatter/lobe.h"
 
 /* ---- one ray ---- */

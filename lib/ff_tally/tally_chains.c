@@ -1,4 +1,4 @@
-#include "lib/ff/tally_chains.h"
+#include "lib/ff_tally/tally_chains.h"
 
 #include <stdlib.h>
 

@@ -2,7 +2,7 @@
 #ifndef TWOPASS_LIGHT_PATHS_H
 #define TWOPASS_LIGHT_PATHS_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/ff_rays/ff_internal.h"
 
 /* The chain of events that a light's rays pass from `to` to `from`: straight and through
  * clear panes; or by way of a mirror, when the ray from `from` towards the image meets it

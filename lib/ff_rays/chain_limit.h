@@ -2,7 +2,7 @@
 #ifndef TWOPASS_CHAIN_LIMIT_H
 #define TWOPASS_CHAIN_LIMIT_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/ff_rays/ff_internal.h"
 
 /* Sets job->chain_most: as high as keeps chains few, by what a few rays meet. O(depth)
  * rays. 0, or -1 and e. */

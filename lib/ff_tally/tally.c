@@ -1,4 +1,4 @@
-#include "lib/ff/tally.h"
+#include "lib/ff_tally/tally.h"
 
 #include <math.h>
 #include <stdlib.h>

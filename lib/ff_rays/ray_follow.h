@@ -2,7 +2,7 @@
 #ifndef TWOPASS_RAY_FOLLOW_H
 #define TWOPASS_RAY_FOLLOW_H
 
-#include "lib/ff/ff_internal.h"
+#include "lib/ff_rays/ff_internal.h"
 
 /* Follows a ray (origin already off its surface) carrying weight w of the row's
  * flux to where it lands, and on through ideal surfaces; tallies everything. */

@@ -1,4 +1,4 @@
-#include "lib/ff/ff_build.h"
+#include "lib/ff_rays/ff_options.h"
 
 enum { RAYS = 4096, HEMICUBE_PIXELS = 64, HEMICUBE_PIXELS_MAX = 8192, GATHER_LEAST = 16 };
 

@@ -4,9 +4,9 @@
 #define TWOPASS_FF_INTERNAL_H
 
 #include "lib/base/rng.h"
-#include "lib/ff/ff_build.h"
-#include "lib/ff/row_formula.h"
-#include "lib/ff/tally.h"
+#include "lib/ff_rays/ff_options.h"
+#include "lib/ff_rays/row_formula.h"
+#include "lib/ff_tally/tally.h"
 #include "lib/hemicube/hemicube.h"
 #include "lib/ray/locate.h"
 #include "lib/ray/mirror.h"

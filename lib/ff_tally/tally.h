@@ -4,8 +4,8 @@
 
 #include "lib/base/mem.h"
 #include "lib/data/model.h"
-#include "lib/ff/ff_batch.h"
-#include "lib/ff/tally_chains.h"
+#include "lib/ff_tally/ff_batch.h"
+#include "lib/ff_tally/tally_chains.h"
 #include "lib/scatter/chain.h"
 
 /* Element-sides in the order of a block's entries: by patch-side, then element. */

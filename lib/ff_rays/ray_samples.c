@@ -1,6 +1,6 @@
 /* Where the rays of a row begin, go and land. The loops that make a batch are without
  * branches and calls, so that compilers turn them into vector code. */
-#include "lib/ff/ray_samples.h"
+#include "lib/ff_rays/ray_samples.h"
 
 #include <math.h>
 #include <string.h>
