@@ -36,6 +36,7 @@ LDFLAGS += -pthread $(SANFLAGS)
 LDLIBS := -lembree3 -lOpenEXRCore-3_1 -ltinygltf -ljansson -lxxhash -lpng -lstdc++ -lm
 
 TOOLS := mesh ffcalc shoot trace reference inspect exrcmp tone
+KEYED := mesh ffcalc shoot trace reference
 PROGRAMS := $(TOOLS:%=$(BUILD)/%)
 LIB_OBJS := $(patsubst %.c,$(BUILD)/%.o,$(wildcard lib/*/*.c formats/*/*.c)) \
 	$(patsubst %.cc,$(BUILD)/%.o,$(wildcard formats/*/*.cc))
@@ -49,8 +50,24 @@ $(BUILD)/libcommon.a: $(LIB_OBJS)
 	@rm -f $@
 	ar rcs $@ $^
 
-$(PROGRAMS): $(BUILD)/%: $(BUILD)/tools/%.o $(CLI_OBJS) $(BUILD)/libcommon.a
+$(BUILD)/libcli.a: $(CLI_OBJS)
+	@rm -f $@
+	ar rcs $@ $^
+
+$(PROGRAMS): $(BUILD)/%: $(BUILD)/tools/%.o $(BUILD)/libcli.a $(BUILD)/libcommon.a
 	$(CC) $(LDFLAGS) -o $@ $^ $(LDLIBS)
+
+# Programs whose outputs have keys know a digest of the sources that the linker says they are
+# made of.
+$(KEYED:%=$(BUILD)/%): $(BUILD)/%: $(BUILD)/code/%.o
+$(BUILD)/code/%.c: $(BUILD)/tools/%.o $(BUILD)/libcli.a $(BUILD)/libcommon.a tools/code_digest.pl
+	@mkdir -p $(@D)
+	@$(CC) $(LDFLAGS) -no-pie -Wl,-t,-t,--unresolved-symbols=ignore-all -o $(@:.c=.link) \
+		$(filter-out %.pl,$^) $(LDLIBS) | perl tools/code_digest.pl $(BUILD) $* >$@.new
+	@rm $(@:.c=.link); mv $@.new $@
+
+$(BUILD)/code/%.o: $(BUILD)/code/%.c
+	$(CC) $(CPPFLAGS) $(CFLAGS) -c -o $@ $<
 
 $(UNIT_TESTS): $(BUILD)/tests/%: $(BUILD)/tests/unit/%.o $(BUILD)/libcommon.a
 	@mkdir -p $(@D)

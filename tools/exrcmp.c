@@ -1,32 +1,39 @@
 /* exrcmp: the difference of two OpenEXR pictures in numbers. */
-#include <getopt.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "formats/container/history.h"
 #include "formats/picture/exr_file.h"
 #include "lib/base/mem.h"
 #include "lib/picture/compare.h"
 #include "tools/common/cli.h"
 
-static const struct cli_option options[] = {
-	{ 'l', "layer", "NAME", "compare the channels of layer NAME only" },
-	{ 'm', "max-rel", "X", "exit with 1 when the relative rmse is beyond X" },
-	{ 'x', "leave-out", "LIST", "leave out pixels that show: emitters,nothing" },
-	{ 'd', "heat", "FILE", "write the picture of the differences a - b to FILE" },
-	{ 'J', "json", NULL, "print JSON" },
-	{ 0, NULL, NULL, NULL }
-};
+/* What --leave-out may name, each its bit. */
+enum { EMITTERS = 1, NOTHING = 2 };
 
-struct options {
+struct request {
 	const char *file[2];
 	const char *layer, *heat;
 	double max_relative; /* negative: not given */
 	int json;
-	int no_emitters, no_nothing; /* pixels that are left out */
+	unsigned leave_out;  /* pixels that show these */
+};
+
+#define REQUEST struct request
+
+static const char *const left_out[] = { "emitters", "nothing", NULL };
+
+static const struct option_spec options[] = {
+	{ 'l', "layer", "NAME", "compare the channels of layer NAME only", TEXT(layer) },
+	{ 'm', "max-rel", "X", "exit with 1 when the relative rmse is beyond X",
+	  NUMBER(max_relative, 0, INFINITY) },
+	{ 'x', "leave-out", "LIST", "leave out pixels that show: emitters,nothing",
+	  SET(leave_out, left_out) },
+	{ 'd', "heat", "FILE", "write the picture of the differences a - b to FILE", TEXT(heat) },
+	{ 'J', "json", NULL, "print JSON", FLAG(json) },
+	{ 0 }
 };
 
 /* Channels that both pictures have. */
@@ -44,41 +51,12 @@ struct pictures {
 	unsigned char *mask; /* of pixels that are left out, or NULL */
 };
 
-static void leave_out(const struct cli *c, struct options *o, const char *list)
+static void check(const struct cli *c, int operand, struct request *o)
 {
-	for (const char *p = list;; p++) {
-		size_t n = strcspn(p, ",");
-
-		if (n == strlen("emitters") && strncmp(p, "emitters", n) == 0)
-			o->no_emitters = 1;
-		else if (n == strlen("nothing") && strncmp(p, "nothing", n) == 0)
-			o->no_nothing = 1;
-		else
-			cli_usage(c, "--leave-out: '%s' is not a list of emitters, nothing", list);
-		p += n;
-		if (!*p)
-			break;
-	}
-}
-
-static void parse(struct cli *c, int argc, char **argv, struct options *o)
-{
-	int letter;
-
-	o->max_relative = -1;
-	while ((letter = cli_next(c, argc, argv)) != -1) {
-		switch (letter) {
-		case 'l': o->layer = optarg; break;
-		case 'm': o->max_relative = cli_number(c, "--max-rel", optarg, 0, INFINITY); break;
-		case 'd': o->heat = optarg; break;
-		case 'x': leave_out(c, o, optarg); break;
-		case 'J': o->json = 1; break;
-		}
-	}
-	if (argc - optind != 2)
+	if (c->argc - operand != 2)
 		cli_usage(c, "two pictures are needed");
-	o->file[0] = argv[optind];
-	o->file[1] = argv[optind + 1];
+	o->file[0] = c->argv[operand];
+	o->file[1] = c->argv[operand + 1];
 	if (strcmp(o->file[0], "-") == 0 && strcmp(o->file[1], "-") == 0)
 		cli_usage(c, "only one picture can come from standard input");
 	if (o->heat && strcmp(o->heat, "-") == 0)
@@ -93,7 +71,7 @@ static int in_layer(const char *channel, const char *layer)
 	                  (channel[n] == '.' || channel[n] == 0));
 }
 
-static int pair_channels(const struct cli *c, const struct options *o, struct pictures *p,
+static int pair_channels(const struct cli *c, const struct request *o, struct pictures *p,
                          struct err *e)
 {
 	const struct image *a = &p->im[0], *b = &p->im[1];
@@ -126,7 +104,7 @@ static int pair_channels(const struct cli *c, const struct options *o, struct pi
 	return 0;
 }
 
-static int read_pictures(const struct cli *c, const struct options *o, struct pictures *p,
+static int read_pictures(const struct cli *c, const struct request *o, struct pictures *p,
                          struct err *e)
 {
 	for (int i = 0; i < 2; i++)
@@ -140,19 +118,21 @@ static int read_pictures(const struct cli *c, const struct options *o, struct pi
 }
 
 /* Marks the pixels that are to be left out, as either picture tells. */
-static int make_mask(const struct options *o, struct pictures *p, struct err *e)
+static int make_mask(const struct request *o, struct pictures *p, struct err *e)
 {
 	const struct image *a = &p->im[0], *b = &p->im[1];
 
-	if (!o->no_emitters && !o->no_nothing)
+	if (!o->leave_out)
 		return 0;
 	p->mask = mem_new((size_t)a->width * (size_t)a->height, 1, "mask", e);
 	if (!p->mask)
 		return -1;
-	if (o->no_emitters && (picture_compare_mask_emitters(a, p->mask) & picture_compare_mask_emitters(b, p->mask)))
+	if ((o->leave_out & EMITTERS) &&
+	    (picture_compare_mask_emitters(a, p->mask) & picture_compare_mask_emitters(b, p->mask)))
 		return err_set(e, "%s: no layer tells where emitters are, nor in %s; "
 		               "use trace --layers emission", o->file[0], o->file[1]);
-	if (o->no_nothing && (picture_compare_mask_nothing(a, p->mask) & picture_compare_mask_nothing(b, p->mask)))
+	if ((o->leave_out & NOTHING) &&
+	    (picture_compare_mask_nothing(a, p->mask) & picture_compare_mask_nothing(b, p->mask)))
 		return err_set(e, "%s: no channel tells where nothing is seen, nor in %s; "
 		               "use trace --layers Z", o->file[0], o->file[1]);
 	return 0;
@@ -199,7 +179,7 @@ static json_t *to_json(const struct compare *d)
 
 /* Compares, prints, and returns what --max-rel judges in *worst: the colours
  * where there are, else the worst channel. */
-static int compare_all(const struct options *o, const struct pictures *p,
+static int compare_all(const struct request *o, const struct pictures *p,
                        struct compare *worst, struct err *e)
 {
 	const struct image *a = &p->im[0], *b = &p->im[1];
@@ -236,13 +216,12 @@ static int compare_all(const struct options *o, const struct pictures *p,
 	return e->set ? -1 : 0;
 }
 
-static int write_heat(const struct options *o, const struct pictures *p, int argc, char **argv,
+static int write_heat(const struct cli *c, const struct request *o, const struct pictures *p,
                       struct err *e)
 {
 	struct image heat = { 0 };
 	struct exr_file_info info = { 0 };
-	char *history = file_history_append(file_exr_info_get(&p->info[0], EXR_FILE_HISTORY), argc,
-	                                    argv, e);
+	char *history = options_history(c, file_exr_info_get(&p->info[0], EXR_FILE_HISTORY), e);
 	int status = -1;
 
 	if (history && file_exr_info_set(&info, EXR_FILE_HISTORY, history, e) == 0 &&
@@ -255,7 +234,7 @@ static int write_heat(const struct options *o, const struct pictures *p, int arg
 	return status;
 }
 
-static int judge(const struct cli *c, const struct options *o, const struct compare *d)
+static int judge(const struct cli *c, const struct request *o, const struct compare *d)
 {
 	if (d->left_out)
 		cli_note(c, "%zu of %zu pixels are not finite in both pictures and were left out",
@@ -275,16 +254,16 @@ int main(int argc, char **argv)
 	struct cli c = { .program = "exrcmp", .synopsis = "[OPTION]... A.exr B.exr",
 		         .about = "Prints the difference of two OpenEXR pictures in numbers.",
 		         .options = options };
-	struct options o = { 0 };
+	struct request o = { .max_relative = -1 };
 	struct pictures p = { 0 };
 	struct compare worst = { 0 };
 	struct err e = { 0 };
 	int status;
 
-	parse(&c, argc, argv, &o);
+	check(&c, options_parse(&c, argc, argv, &o), &o);
 	cli_signals();
 	if (read_pictures(&c, &o, &p, &e) || make_mask(&o, &p, &e) || compare_all(&o, &p, &worst, &e) ||
-	    (o.heat && write_heat(&o, &p, argc, argv, &e)))
+	    (o.heat && write_heat(&c, &o, &p, &e)))
 		status = cli_fail(&c, &e);
 	else
 		status = judge(&c, &o, &worst);

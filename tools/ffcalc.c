@@ -1,5 +1,4 @@
 /* ffcalc: form factors, diffuse and directional, of a mesh. */
-#include <getopt.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
@@ -8,120 +7,97 @@
 
 #include "formats/cache/ff_file.h"
 #include "formats/cache/mesh_file.h"
-#include "formats/container/digest.h"
-#include "formats/container/history.h"
 #include "lib/ff/ff_build.h"
 #include "tools/common/cli.h"
-
-enum { OPT_PRECISION = 256, OPT_PART, OPT_DEPTH, OPT_SEED, OPT_LOBE_RAYS, OPT_GAIN, OPT_GATHER,
-       OPT_TO, OPT_CLOSE, OPT_LOBE_DEPTH, OPT_LINKS };
-
-static const struct cli_option options[] = {
-	{ 'o', "output", "FILE", "write the form factors to FILE (.ff)" },
-	{ 'm', "method", "METHOD", "auto, rays, hemicube or analytic (default auto)" },
-	{ 'n', "samples", "N", "rays a patch-side (default 4096), or pixels along a hemicube's edge (64)" },
-	{ 'p', "points", "N", "hemicubes a patch-side (default 16)" },
-	{ 't', "target", "X", "formulas: absolute error of a factor that is partly hidden (default 1e-4, to patches 1e-6)" },
-	{ OPT_TO, "to", "WHAT", "elements or patches: what receives (default elements)" },
-	{ OPT_CLOSE, "close", NULL, "formulas to patches: change what is in doubt so that closed rows add up" },
-	{ OPT_GAIN, "emitter-gain", "N", "times as many rays for emitters (default 8)" },
-	{ OPT_GATHER, "gather", "N", "rays an element-side gathers with (default a sixteenth of -n)" },
-	{ OPT_LOBE_RAYS, "lobe-rays", "N", "rays a patch-side for each directional lobe (default 4096)" },
-	{ OPT_LINKS, "links", "HOW", "rays or centroid (the paper's): where light comes to a lobe from (default rays)" },
-	{ OPT_LOBE_DEPTH, "lobe-depth", "N", "most lobes that light of a lobe is followed through (default 4)" },
-	{ OPT_DEPTH, "depth", "N", "longest chain of mirrors, panes and lobes that is told apart (default 256)" },
-	{ OPT_PRECISION, "precision", "TYPE", "f32 or f64 (default f32)" },
-	{ OPT_PART, "part", "K/N", "compute the K-th of N shards only" },
-	{ OPT_SEED, "seed", "N", "seed of the sample points (default 1)" },
-	{ 0, NULL, NULL, NULL }
-};
+#include "tools/common/key.h"
 
 struct request {
 	const char *mesh, *output;
+	uint32_t shard[2];
 	struct ff_options ff;
 };
 
-static void parse_part(const struct cli *c, const char *text, struct ff_options *o)
+#define REQUEST struct request
+
+/* In the order of their values. */
+static const char *const methods[] = { "rays", "hemicube", "analytic", "auto", NULL };
+static const char *const receivers[] = { "elements", "patches", NULL };
+static const char *const sources[] = { "rays", "centroid", NULL };
+static const char *const precisions[] = { "f32", "f64", NULL };
+
+static const struct option_spec options[] = {
+	{ 'o', "output", "FILE", "write the form factors to FILE (.ff)", TEXT(output),
+	  .role = OPTION_ASIDE },
+	{ 'm', "method", "METHOD", "auto, rays, hemicube or analytic (default %s)",
+	  WORD(ff.method, methods), .preset = "auto" },
+	{ 'n', "samples", "N",
+	  "rays a patch-side (default 4096), or pixels along a hemicube's edge (64)",
+	  INTEGER(ff.rays, 4, 1 << 26) },
+	{ 'p', "points", "N", "hemicubes a patch-side (default %s)", INTEGER(ff.points, 1, 4096),
+	  .preset = "16" },
+	{ 't', "target", "X",
+	  "formulas: absolute error of a factor that is partly hidden (default 1e-4, to patches 1e-6)",
+	  NUMBER(ff.target, 1e-12, 1) },
+	{ 0, "to", "WHAT", "elements or patches: what receives (default %s)",
+	  WORD(ff.to_patches, receivers), .preset = "elements" },
+	{ 0, "close", NULL,
+	  "formulas to patches: change what is in doubt so that closed rows add up",
+	  FLAG(ff.close) },
+	{ 0, "emitter-gain", "N", "times as many rays for emitters (default %s)",
+	  INTEGER(ff.emitter_gain, 1, 4096), .preset = "8" },
+	{ 0, "gather", "N", "rays an element-side gathers with (default a sixteenth of -n)",
+	  INTEGER(ff.gather, 0, 1 << 20) },
+	{ 0, "lobe-rays", "N", "rays a patch-side for each directional lobe (default %s)",
+	  INTEGER(ff.lobe_rays, 1, 1 << 26), .preset = "4096" },
+	{ 0, "links", "HOW",
+	  "rays or centroid (the paper's): where light comes to a lobe from (default %s)",
+	  WORD(ff.centroid, sources), .preset = "rays" },
+	{ 0, "lobe-depth", "N", "most lobes that light of a lobe is followed through (default %s)",
+	  INTEGER(ff.lobe_depth, 0, 64), .preset = "4" },
+	{ 0, "depth", "N",
+	  "longest chain of mirrors, panes and lobes that is told apart (default %s)",
+	  INTEGER(ff.depth, 0, 1000000), .preset = "256" },
+	{ 0, "precision", "TYPE", "f32 or f64 (default %s)", WORD(ff.f64, precisions),
+	  .preset = "f32" },
+	{ 0, "part", "K/N", "compute the K-th of N shards only", RATIO(shard) },
+	{ 0, "seed", "N", "seed of the sample points (default %s)", INTEGER(ff.seed, 0, INT64_MAX),
+	  .preset = "1" },
+	{ 0 }
+};
+
+static void settle(struct cli *c, int operand, struct request *r)
 {
-	unsigned k, n;
-	char end;
-
-	if (sscanf(text, "%u/%u%c", &k, &n, &end) != 2 || k < 1 || k > n || n > 1000000)
-		cli_usage(c, "--part %s: a shard is K/N with 1 <= K <= N, such as 2/4", text);
-	o->shard = k;
-	o->shards = n;
-}
-
-static void parse_word(const struct cli *c, const char *option, const char *text,
-                       const char *yes, const char *no, int *value)
-{
-	if (strcmp(text, yes) && strcmp(text, no))
-		cli_usage(c, "%s %s: must be %s or %s", option, text, no, yes);
-	*value = strcmp(text, yes) == 0;
-}
-
-static const char *const method_name[] = { "rays", "hemicube", "analytic", "auto" };
-
-static enum ff_method parse_method(const struct cli *c, const char *text)
-{
-	for (int i = 0; i < 4; i++)
-		if (strcmp(text, method_name[i]) == 0)
-			return (enum ff_method)i;
-	cli_usage(c, "--method %s: must be auto, rays, hemicube or analytic", text);
-	return FF_AUTO;
-}
-
-static void parse(struct cli *c, int argc, char **argv, struct request *r)
-{
-	int letter;
 	struct ff_options *o = &r->ff;
-	struct err wrong = { 0 };
+	struct err contradiction = { 0 };
 
-	*o = FF_OPTIONS_DEFAULT;
-	while ((letter = cli_next(c, argc, argv)) != -1) {
-		switch (letter) {
-		case 'o': r->output = optarg; break;
-		case 'm': o->method = parse_method(c, optarg); break;
-		case 't': o->target = cli_number(c, "--target", optarg, 1e-12, 1); break;
-		case OPT_TO: parse_word(c, "--to", optarg, "patches", "elements", &o->to_patches); break;
-		case 'n': o->rays = (uint32_t)cli_integer(c, "--samples", optarg, 4, 1 << 26); break;
-		case 'p': o->points = (uint32_t)cli_integer(c, "--points", optarg, 1, 4096); break;
-		case OPT_CLOSE: o->close = 1; break;
-		case OPT_GAIN: o->emitter_gain = (uint32_t)cli_integer(c, "--emitter-gain", optarg, 1, 4096); break;
-		case OPT_GATHER: o->gather = (uint32_t)cli_integer(c, "--gather", optarg, 0, 1 << 20); break;
-		case OPT_LOBE_RAYS: o->lobe_rays = (uint32_t)cli_integer(c, "--lobe-rays", optarg, 1, 1 << 26); break;
-		case OPT_LINKS: parse_word(c, "--links", optarg, "centroid", "rays", &o->centroid); break;
-		case OPT_LOBE_DEPTH: o->lobe_depth = (uint32_t)cli_integer(c, "--lobe-depth", optarg, 0, 64); break;
-		case OPT_DEPTH: o->depth = (uint32_t)cli_integer(c, "--depth", optarg, 0, 1000000); break;
-		case OPT_PRECISION: parse_word(c, "--precision", optarg, "f64", "f32", &o->f64); break;
-		case OPT_PART: parse_part(c, optarg, o); break;
-		case OPT_SEED: o->seed = (uint64_t)cli_integer(c, "--seed", optarg, 0, 0x7fffffffffffffff); break;
-		}
-	}
-	if (argc - optind != 1)
+	if (c->argc - operand != 1)
 		cli_usage(c, "one .mesh file is needed");
 	if (!r->output)
 		cli_usage(c, "an output is needed: -o FILE.ff");
-	r->mesh = argv[optind];
+	r->mesh = c->argv[operand];
 	cli_keep_input(c, r->output, r->mesh);
+	if (!options_given(c, "gather"))
+		o->gather = FF_GATHER_UNSET;
+	if (ff_options_complete(o, &contradiction))
+		cli_usage(c, "%s", contradiction.text);
+	o->shard = r->shard[0];
+	o->shards = r->shard[1];
 	o->threads = c->threads;
-	if (ff_options_complete(o, &wrong))
-		cli_usage(c, "%s", wrong.text);
 }
 
 static json_t *options_json(const struct ff_options *o)
 {
 	json_t *j = json_pack("{s:s, s:I, s:I, s:I, s:I, s:s, s:I, s:I}",
-		"method", method_name[o->method],
+		"method", methods[o->method],
 		"samples", (json_int_t)o->rays, "lobe_rays", (json_int_t)o->lobe_rays,
 		"depth", (json_int_t)o->depth, "seed", (json_int_t)o->seed,
-		"precision", o->f64 ? "f64" : "f32",
+		"precision", precisions[o->f64],
 		"part", (json_int_t)o->shard, "parts", (json_int_t)o->shards);
 
 	if (o->method != FF_HEMICUBE)
 		json_object_set_new(j, "gather", json_integer(o->gather));
 	json_object_set_new(j, "emitter_gain", json_integer(o->emitter_gain));
-	json_object_set_new(j, "links", json_string(o->centroid ? "centroid" : "rays"));
+	json_object_set_new(j, "links", json_string(sources[o->centroid]));
 	json_object_set_new(j, "lobe_depth", json_integer(o->lobe_depth));
 	if (o->to_patches)
 		json_object_set_new(j, "to", json_string("patches"));
@@ -148,15 +124,14 @@ static json_t *report_json(const struct ff_stats *s)
 		"worst_row_error", s->worst_error, "largest_cut", s->cut);
 }
 
-/* Everything the output depends on, so that an equal one need not be made again. */
-static void make_key(const struct cache_info *mesh, const char *chosen, char key[33])
+/* Everything the form factors depend on. */
+static void make_key(const struct cli *c, const struct request *r, const struct cache_info *mesh,
+                     char key[KEY_BYTES])
 {
-	struct digest *d = file_digest_new();
+	struct digest *d = key_begin(c, r);
 
-	file_digest_string(d, "ffcalc " TWOPASS_VERSION " " REVISION_FF);
 	file_digest_string(d, mesh->geometry_id);
-	file_digest_string(d, chosen);
-	file_digest_end(d, key);
+	key_end(d, key);
 }
 
 static int put(void *arg, const struct ff *batch, struct err *e)
@@ -224,27 +199,39 @@ static int compute(struct cli *c, const struct request *r, const struct model *m
 	return bad;
 }
 
-static int run(struct cli *c, const struct request *r, int argc, char **argv, struct err *e)
+/* An output that fits is kept, with the names that the model has now. */
+static int keep(const struct cli *c, const struct request *r, const struct model *m,
+                enum key_fit fit, struct err *e)
+{
+	int renamed = file_ff_rename(r->output, m, e);
+
+	if (renamed < 0)
+		return -1;
+	if (renamed)
+		cli_note(c, "%s: names replaced, form factors kept", r->output);
+	if (!renamed || fit != KEY_FITS)
+		key_kept(c, r->output, fit);
+	return 0;
+}
+
+static int run(struct cli *c, const struct request *r, struct err *e)
 {
 	struct model m = { 0 };
 	struct cache_info mesh = { 0 }, info = { 0 };
-	char key[33];
+	char key[KEY_BYTES];
 	int bad = file_mesh_read(r->mesh, &m, &mesh, e);
 
 	if (!bad) {
-		json_t *j = options_json(&r->ff);
-		info.options = json_dumps(j, JSON_COMPACT | JSON_SORT_KEYS);
-		json_decref(j);
-		make_key(&mesh, info.options, key);
-		if (file_cache_up_to_date(r->output, "twopass.ff", key)) {
-			int renamed = file_ff_rename(r->output, &m, e);
-			bad = renamed < 0 ? -1 : 0;
-			if (!bad)
-				cli_note(c, "%s: %s", r->output, renamed ? "names replaced, form factors kept"
-				                                         : "up to date");
+		make_key(c, r, &mesh, key);
+		enum key_fit fit = file_cache_up_to_date(r->output, "twopass.ff", key, c->any_version);
+		if (fit) {
+			bad = keep(c, r, &m, fit, e);
 		} else {
+			json_t *j = options_json(&r->ff);
+			info.options = json_dumps(j, JSON_COMPACT | JSON_SORT_KEYS);
+			json_decref(j);
 			info.key = strdup(key);
-			info.history = file_history_append(mesh.history, argc, argv, e);
+			info.history = options_history(c, mesh.history, e);
 			bad = !info.history || !info.key || compute(c, r, &m, &info, e);
 		}
 	}
@@ -258,11 +245,11 @@ int main(int argc, char **argv)
 {
 	struct cli c = { .program = "ffcalc", .synopsis = "[OPTION]... -o FILE.ff FILE.mesh",
 	                 .about = "Computes the form factors of a mesh.", .options = options,
-	                 .uses_threads = 1 };
-	struct request r = { 0 };
+	                 .uses_threads = 1, .keeps_output = 1 };
+	struct request r = { .shard = { 1, 1 }, .ff.evaluations = 50000 };
 	struct err e = { 0 };
 
-	parse(&c, argc, argv, &r);
+	settle(&c, options_parse(&c, argc, argv, &r), &r);
 	cli_signals();
-	return cli_finish(&c, run(&c, &r, argc, argv, &e) ? cli_fail(&c, &e) : 0);
+	return cli_finish(&c, run(&c, &r, &e) ? cli_fail(&c, &e) : 0);
 }

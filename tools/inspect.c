@@ -1,5 +1,4 @@
 /* inspect: what is in a .mesh, .ff or .rad file, and whether it is right. */
-#include <getopt.h>
 #include <inttypes.h>
 #include <jansson.h>
 #include <math.h>
@@ -23,21 +22,26 @@ enum { SHOWN = 60 };
 
 #define PATCH_MATRIX "patch-matrix"
 
-static const struct cli_option options[] = {
-	{ 'J', "json", NULL, "print JSON" },
-	{ 'V', "verify", NULL, "check digests, structure and physics; exit 1 if anything is wrong" },
-	{ 'c', "csv", NULL, "print a line for each element-side (.mesh, .rad)" },
-	{ 'r', "row", "I", "print row I (.ff) or element-side I (.mesh, .rad)" },
-	{ 'p', PATCH_MATRIX, NULL, "print form factors between patch-sides as CSV (.ff)" },
-	{ 'n', "npy", "ARRAY", "write ARRAY, or " PATCH_MATRIX ", as .npy" },
-	{ 'o', "output", "FILE", "where --npy goes (default standard output)" },
-	{ 0, NULL, NULL, NULL }
-};
-
 struct request {
 	const char *file, *npy, *output;
 	int json, verify, csv, matrix;
 	long row; /* negative: not asked for */
+};
+
+#define REQUEST struct request
+
+static const struct option_spec options[] = {
+	{ 'J', "json", NULL, "print JSON", FLAG(json) },
+	{ 'V', "verify", NULL, "check digests, structure and physics; exit 1 if anything is wrong",
+	  FLAG(verify) },
+	{ 'c', "csv", NULL, "print a line for each element-side (.mesh, .rad)", FLAG(csv) },
+	{ 'r', "row", "I", "print row I (.ff) or element-side I (.mesh, .rad)",
+	  INTEGER(row, 0, UINT32_MAX) },
+	{ 'p', PATCH_MATRIX, NULL, "print form factors between patch-sides as CSV (.ff)",
+	  FLAG(matrix) },
+	{ 'n', "npy", "ARRAY", "write ARRAY, or " PATCH_MATRIX ", as .npy", TEXT(npy) },
+	{ 'o', "output", "FILE", "where --npy goes (default standard output)", TEXT(output) },
+	{ 0 }
 };
 
 /* The file as its kind has it; the rest is zero. */
@@ -50,30 +54,18 @@ struct content {
 	struct cache_info info;
 };
 
-static void parse(struct cli *c, int argc, char **argv, struct request *r)
+static void check(const struct cli *c, int operand, struct request *r)
 {
-	int letter;
-
-	*r = (struct request){ .row = -1 };
-	while ((letter = cli_next(c, argc, argv)) != -1) {
-		switch (letter) {
-		case 'J': r->json = 1; break;
-		case 'V': r->verify = 1; break;
-		case 'c': r->csv = 1; break;
-		case 'r': r->row = cli_integer(c, "--row", optarg, 0, UINT32_MAX); break;
-		case 'p': r->matrix = 1; break;
-		case 'n': r->npy = optarg; break;
-		case 'o': r->output = optarg; break;
-		}
-	}
-	if (argc - optind != 1)
+	if (c->argc - operand != 1)
 		cli_usage(c, "one .mesh, .ff or .rad file is needed");
-	r->file = argv[optind];
+	r->file = c->argv[operand];
 	if (r->csv + r->matrix + (r->row >= 0) + (r->npy != NULL) + (r->json || r->verify) > 1)
 		cli_usage(c, "--json (with or without --verify), --csv, --row, --patch-matrix and "
 		             "--npy are different outputs; ask for one");
 	if (r->output && !r->npy)
 		cli_usage(c, "--output is where --npy goes; redirect other output");
+	if (r->npy && (!r->output || strcmp(r->output, "-") == 0) && isatty(STDOUT_FILENO))
+		cli_usage(c, "--npy is binary; redirect it or give --output");
 	cli_keep_input(c, r->output, r->file);
 }
 
@@ -408,14 +400,12 @@ int main(int argc, char **argv)
 	struct cli c = { .program = "inspect", .synopsis = "[options] FILE",
 		.about = "Shows what is in a .mesh, .ff or .rad file, and whether it is right.",
 		.options = options };
-	struct request r;
+	struct request r = { .row = -1 };
 	struct content x = { 0 };
 	struct err e = { 0 };
 
 	cli_signals();
-	parse(&c, argc, argv, &r);
-	if (r.npy && (!r.output || strcmp(r.output, "-") == 0) && isatty(STDOUT_FILENO))
-		cli_usage(&c, "--npy is binary; redirect it or give --output");
+	check(&c, options_parse(&c, argc, argv, &r), &r);
 	int failed = inspect(&r, &x, &e);
 	content_free(&x);
 	return cli_finish(&c, failed ? cli_fail(&c, &e) : 0);

@@ -1,5 +1,4 @@
 /* mesh: from a glTF scene to elements and patches. */
-#include <getopt.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
@@ -8,35 +7,12 @@
 
 #include "formats/cache/mesh_file.h"
 #include "formats/cache/rad_file.h"
-#include "formats/container/digest.h"
-#include "formats/container/history.h"
 #include "formats/gltf/gltf_file.h"
 #include "lib/mesh/mesher.h"
 #include "tools/common/cli.h"
+#include "tools/common/key.h"
 
 #define FORMAT "twopass.mesh"
-
-enum { OPT_CONE = 256, OPT_DIRECTIONAL, OPT_EXPONENT, OPT_LOBE, OPT_BANDS, OPT_CLAMP,
-       OPT_NO_IMPRINT, OPT_REFINE, OPT_REFINE_ERROR, OPT_REFINE_SMALLEST,
-       OPT_REFINE_ELEMENTS };
-
-static const struct cli_option options[] = {
-	{ 'o', "output", "FILE", "write the mesh to FILE (.mesh; - is standard output)" },
-	{ 'p', "patch-size", "SIZE", "longest side of a patch: metres, 5% of the scene, inf (default 5%)" },
-	{ 'e', "element-size", "SIZE", "longest edge of an element (default 4%, but within the patch size)" },
-	{ OPT_CONE, "normal-cone", "DEG", "how far normals in a curved patch may turn (default 20)" },
-	{ OPT_NO_IMPRINT, "no-imprint", NULL, "do not cut surfaces where others cross or touch them" },
-	{ OPT_DIRECTIONAL, "min-directional", "X", "fold derived lobes below this share into diffuse (default .05)" },
-	{ OPT_EXPONENT, "min-exponent", "K", "fold derived lobes of lower exponent into diffuse (default 2)" },
-	{ OPT_LOBE, "lobe", "KIND", "what exponents mean: paper (default) or reciprocal" },
-	{ OPT_BANDS, "bands", "N", "number of bands (default: 1 for a grey scene, else 3)" },
-	{ OPT_CLAMP, "clamp", NULL, "rescale materials that return more than they receive" },
-	{ OPT_REFINE, "refine", "FILE.rad", "divide the mesh of an earlier solution further where it is in error" },
-	{ OPT_REFINE_ERROR, "refine-error", "X", "until its relative error is X (default .02)" },
-	{ OPT_REFINE_SMALLEST, "refine-smallest", "SIZE", "but no element to a shorter longest edge (default .25%)" },
-	{ OPT_REFINE_ELEMENTS, "refine-elements", "N", "and to about N elements at most (default 1000000)" },
-	{ 0, NULL, NULL, NULL }
-};
 
 struct request {
 	const char *scene, *output;
@@ -44,6 +20,44 @@ struct request {
 	const char *solution;            /* to refine, or NULL */
 	struct mesh_refinement refine;
 	struct gltf_options gltf;
+};
+
+#define REQUEST struct request
+
+static const char *const lobes[] = { "paper", "reciprocal", NULL };
+
+static const struct option_spec options[] = {
+	{ 'o', "output", "FILE", "write the mesh to FILE (.mesh; - is standard output)",
+	  TEXT(output), .role = OPTION_ASIDE },
+	{ 'p', "patch-size", "SIZE",
+	  "longest side of a patch: metres, 5% of the scene, inf (default %s)",
+	  LENGTH(mesher.patch), .preset = "5%" },
+	{ 'e', "element-size", "SIZE",
+	  "longest edge of an element (default %s, but within the patch size)",
+	  LENGTH(mesher.element), .preset = "4%" },
+	{ 0, "normal-cone", "DEG", "how far normals in a curved patch may turn (default %s)",
+	  NUMBER(mesher.normal_cone, 0, 80), .preset = "20" },
+	{ 0, "no-imprint", NULL, "do not cut surfaces where others cross or touch them",
+	  FLAG(mesher.no_imprint) },
+	{ 0, "min-directional", "X", "fold derived lobes below this share into diffuse (default %s)",
+	  NUMBER(gltf.min_directional, 0, 1), .preset = ".05" },
+	{ 0, "min-exponent", "K", "fold derived lobes of lower exponent into diffuse (default %s)",
+	  NUMBER(gltf.min_exponent, 0, INFINITY), .preset = "2" },
+	{ 0, "lobe", "KIND", "what exponents mean: %s (default) or reciprocal",
+	  WORD(gltf.lobe, lobes), .preset = "paper" },
+	{ 0, "bands", "N", "number of bands (default: 1 for a grey scene, else 3)",
+	  INTEGER(gltf.bands, 1, BANDS_MAX) },
+	{ 0, "clamp", NULL, "rescale materials that return more than they receive",
+	  FLAG(gltf.clamp) },
+	{ 0, "refine", "FILE.rad", "divide the mesh of an earlier solution further where it is in error",
+	  TEXT(solution), .role = OPTION_RECORDED },
+	{ 0, "refine-error", "X", "until its relative error is X (default %s)",
+	  NUMBER(refine.error, 0, INFINITY), .preset = ".02" },
+	{ 0, "refine-smallest", "SIZE", "but no element to a shorter longest edge (default %s)",
+	  LENGTH(refine.smallest), .preset = ".25%" },
+	{ 0, "refine-elements", "N", "and to about N elements at most (default %s)",
+	  INTEGER(refine.elements, 1, 1 << 28), .preset = "1000000" },
+	{ 0 }
 };
 
 struct job {
@@ -56,89 +70,21 @@ struct job {
 	struct model old;                /* of the solution to refine */
 	struct solution s;
 	struct cache_info old_info;
+	char solution_content[33];       /* its digest, or "" */
 	uint32_t *origin;                /* [elements] in the old model */
 };
 
-/* A length in metres, in percent of the scene, or `inf`. */
-static struct mesh_size parse_size(const struct cli *c, const char *option, char *text)
+static void settle(struct cli *c, int operand, struct request *r)
 {
-	size_t n = strlen(text);
-	struct mesh_size s = { 0, n > 0 && text[n - 1] == '%' };
-
-	if (s.relative)
-		text[n - 1] = 0;
-	s.value = cli_number(c, option, text, 0, INFINITY);
-	if (s.relative)
-		text[n - 1] = '%';
-	if (s.value == 0)
-		cli_usage(c, "%s: a size must be greater than 0", option);
-	if (s.relative)
-		s.value /= 100;
-	return s;
-}
-
-static enum lobe_kind parse_lobe(const struct cli *c, const char *text)
-{
-	if (strcmp(text, "paper") == 0)
-		return LOBE_PAPER;
-	if (strcmp(text, "reciprocal") != 0)
-		cli_usage(c, "--lobe: '%s' is neither paper nor reciprocal", text);
-	return LOBE_RECIPROCAL;
-}
-
-static void parse(struct cli *c, int argc, char **argv, struct request *r)
-{
-	int letter, refines = 0;
-
-	r->refine = (struct mesh_refinement){ .02, { .0025, 1 }, 1000000 };
-	r->mesher = MESHER_OPTIONS_DEFAULT;
-	r->gltf = GLTF_OPTIONS_DEFAULT;
-	while ((letter = cli_next(c, argc, argv)) != -1) {
-		switch (letter) {
-		case 'o': r->output = optarg; break;
-		case 'p': r->mesher.patch = parse_size(c, "--patch-size", optarg); break;
-		case 'e':
-			r->mesher.element = parse_size(c, "--element-size", optarg);
-			r->mesher.element_within_patch = 0;
-			break;
-		case OPT_CONE:
-			r->mesher.normal_cone = cli_number(c, "--normal-cone", optarg, 0, 80);
-			break;
-		case OPT_NO_IMPRINT: r->mesher.no_imprint = 1; break;
-		case OPT_REFINE: r->solution = optarg; break;
-		case OPT_REFINE_ERROR:
-			r->refine.error = cli_number(c, "--refine-error", optarg, 0, INFINITY);
-			refines = 1;
-			break;
-		case OPT_REFINE_SMALLEST:
-			r->refine.smallest = parse_size(c, "--refine-smallest", optarg);
-			refines = 1;
-			break;
-		case OPT_REFINE_ELEMENTS:
-			r->refine.elements = (size_t)cli_integer(c, "--refine-elements", optarg, 1,
-			                                         1 << 28);
-			refines = 1;
-			break;
-		case OPT_DIRECTIONAL:
-			r->gltf.min_directional = cli_number(c, "--min-directional", optarg, 0, 1);
-			break;
-		case OPT_EXPONENT:
-			r->gltf.min_exponent = cli_number(c, "--min-exponent", optarg, 0, INFINITY);
-			break;
-		case OPT_LOBE: r->gltf.lobe = parse_lobe(c, optarg); break;
-		case OPT_BANDS:
-			r->gltf.bands = (int)cli_integer(c, "--bands", optarg, 1, BANDS_MAX);
-			break;
-		case OPT_CLAMP: r->gltf.clamp = 1; break;
-		}
-	}
-	if (argc - optind != 1)
+	r->mesher.element_within_patch = !options_given(c, "element-size");
+	if (c->argc - operand != 1)
 		cli_usage(c, "one glTF file is needed");
 	if (!r->output)
 		cli_usage(c, "an output is needed: -o FILE.mesh");
-	if (refines && !r->solution)
+	if (!r->solution && (options_given(c, "refine-error") || options_given(c, "refine-smallest") ||
+	                     options_given(c, "refine-elements")))
 		cli_usage(c, "--refine-error, -smallest and -elements need --refine FILE.rad");
-	r->scene = argv[optind];
+	r->scene = c->argv[operand];
 	cli_keep_input(c, r->output, r->scene);
 	if (r->solution)
 		cli_keep_input(c, r->output, r->solution);
@@ -178,7 +124,7 @@ static char *options_text(const struct request *r, struct err *e)
 	                      "imprint", !r->mesher.no_imprint,
 	                      "min_directional", r->gltf.min_directional,
 	                      "min_exponent", length_json(r->gltf.min_exponent),
-	                      "lobe", r->gltf.lobe == LOBE_PAPER ? "paper" : "reciprocal",
+	                      "lobe", lobes[r->gltf.lobe],
 	                      "bands", r->gltf.bands, "clamp", r->gltf.clamp);
 
 	if (r->solution)
@@ -282,19 +228,18 @@ static char *report_text(const struct job *j, struct err *e)
 	return dump(o, e);
 }
 
-/* Equal keys, equal output: program, options, content of the scene's files, the solution. */
+/* Everything the mesh depends on. */
 static char *make_key(const struct job *j)
 {
-	char hex[33];
-	struct digest *d = file_digest_new();
+	struct digest *d = key_begin(j->cli, j->r);
+	char key[KEY_BYTES];
+	uint8_t within = (uint8_t)j->r->mesher.element_within_patch;
 
-	file_digest_string(d, "mesh " TWOPASS_VERSION " " CACHE_VERSION " " REVISION_MESH);
-	file_digest_string(d, j->info.options);
+	file_digest_bytes(d, &within, sizeof within);
 	file_digest_string(d, j->gltf.digest);
-	if (j->r->solution)
-		file_digest_string(d, j->old_info.key ? j->old_info.key : "");
-	file_digest_end(d, hex);
-	return strdup(hex);
+	file_digest_string(d, j->solution_content);
+	key_end(d, key);
+	return strdup(key);
 }
 
 /* ---- the report for people ---- */
@@ -362,8 +307,7 @@ static void print_modelled(FILE *f, const struct job *j)
 	fprintf(f, "bands       %d%s\n", m->bands,
 	        m->bands > 1 ? "" : j->r->gltf.bands ? "" : ": the scene is grey");
 	if (r->lobes)
-		fprintf(f, "lobes       %s\n",
-		        m->lobe == LOBE_PAPER ? "paper" : "reciprocal");
+		fprintf(f, "lobes       %s\n", lobes[m->lobe]);
 	fprintf(f, "left out    ");
 	int any = 0;
 	if (r->two_sided < r->materials)
@@ -428,10 +372,10 @@ static int divide(struct job *j, struct err *e)
 	return status ? err_set(e, "%s: %s", j->r->scene, inner.text) : 0;
 }
 
-static int write_mesh(struct job *j, int argc, char **argv, struct err *e)
+static int write_mesh(struct job *j, struct err *e)
 {
 	j->info.report = report_text(j, e);
-	j->info.history = file_history_append(NULL, argc, argv, e);
+	j->info.history = options_history(j->cli, NULL, e);
 	if (!j->info.report || !j->info.history)
 		return -1;
 	file_cache_ids(&j->m, &j->info);
@@ -448,7 +392,20 @@ static void print_report(const struct job *j)
 	print_modelled(f, j);
 }
 
-static int work(struct job *j, int argc, char **argv, struct err *e)
+/* The solution to refine, if there is one. */
+static int read_solution(struct job *j, struct err *e)
+{
+	const char *path = j->r->solution;
+	struct container *c = path ? file_container_open(path, "twopass.rad", e) : NULL;
+
+	if (!c)
+		return path ? -1 : 0;
+	file_container_digest(c, j->solution_content);
+	file_container_close(c);
+	return file_rad_read(path, &j->old, &j->s, &j->old_info, e);
+}
+
+static int work(struct job *j, struct err *e)
 {
 	double begun = cli_seconds();
 
@@ -456,19 +413,21 @@ static int work(struct job *j, int argc, char **argv, struct err *e)
 		return -1;
 	for (size_t i = 0; i < j->gltf.notes; i++)
 		cli_note(j->cli, "%s: %s", j->r->scene, j->gltf.note[i]);
-	if (j->r->solution && file_rad_read(j->r->solution, &j->old, &j->s, &j->old_info, e))
+	if (read_solution(j, e))
 		return -1;
 	j->info.options = options_text(j->r, e);
 	if (!j->info.options || !(j->info.key = make_key(j)))
 		return err_set(e, "out of memory for options");
-	if (!is_stdout(j) && file_cache_up_to_date(j->r->output, FORMAT, j->info.key)) {
-		cli_note(j->cli, "%s: up to date", j->r->output);
+	enum key_fit fit = is_stdout(j) ? KEY_DIFFERS
+	                 : file_cache_up_to_date(j->r->output, FORMAT, j->info.key, j->cli->any_version);
+	if (fit) {
+		key_kept(j->cli, j->r->output, fit);
 		return 0;
 	}
 	if (divide(j, e))
 		return -1;
 	warn_surfaces(j);
-	if (write_mesh(j, argc, argv, e))
+	if (write_mesh(j, e))
 		return -1;
 	print_report(j);
 	cli_detail(j->cli, "%s: %.2f s, %.0f MB", j->r->output, cli_seconds() - begun,
@@ -481,14 +440,14 @@ int main(int argc, char **argv)
 	struct cli c = { .program = "mesh", .synopsis = "[OPTION]... SCENE.gltf -o FILE.mesh",
 		         .about = "Reads a glTF scene, cleans it, and divides its surfaces into "
 		                  "elements and patches.",
-		         .options = options, .uses_threads = 1 };
+		         .options = options, .uses_threads = 1, .keeps_output = 1 };
 	struct request r = { 0 };
 	struct job j = { .cli = &c, .r = &r };
 	struct err e = { 0 };
 
 	cli_signals();
-	parse(&c, argc, argv, &r);
-	int status = work(&j, argc, argv, &e) ? cli_fail(&c, &e) : 0;
+	settle(&c, options_parse(&c, argc, argv, &r), &r);
+	int status = work(&j, &e) ? cli_fail(&c, &e) : 0;
 	mesh_report_free(&j.mesher);
 	gltf_report_free(&j.gltf);
 	file_cache_info_free(&j.info);

@@ -1,5 +1,4 @@
 /* reference: the yardstick; unbiased pictures and irradiance by Monte Carlo. */
-#include <getopt.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -9,34 +8,20 @@
 #include "formats/cache/cache.h"
 #include "formats/cache/mesh_file.h"
 #include "formats/container/atomic_file.h"
-#include "formats/container/digest.h"
-#include "formats/container/history.h"
 #include "formats/picture/exr_file.h"
 #include "lib/base/mem.h"
 #include "lib/picture/camera.h"
 #include "lib/reference/pathtrace.h"
 #include "tools/common/cli.h"
+#include "tools/common/key.h"
 
-enum { OPT_SAMPLES = 256, OPT_SEED, OPT_IRRADIANCE, OPT_COMPRESSION, OPT_CENTRE };
 enum { PICTURE_SAMPLES = 64, PARTICLES = 1000000 };
-
-static const struct cli_option option_table[] = {
-	{ 'c', "camera", "NAME", "camera to render" },
-	{ 'o', "output", "FILE", "picture (EXR) or table (CSV) to write; - for standard output" },
-	{ 's', "size", "WxH", "pixels (default: 640 wide, height from the camera's aspect)" },
-	{ OPT_IRRADIANCE, "irradiance", NULL, "irradiance of all element-sides by particles" },
-	{ OPT_SAMPLES, "samples", "N", "paths in each pixel (default: 64), or particles (1000000)" },
-	{ OPT_CENTRE, "centre", NULL, "sample each pixel at its centre, as trace --samples 1 does" },
-	{ OPT_SEED, "seed", "N", "start of the random numbers (default: 1)" },
-	{ OPT_COMPRESSION, "compression", "METHOD", "auto (default), zip, zips, piz, rle or none" },
-	{ 0, NULL, NULL, NULL }
-};
 
 struct reference {
 	struct cli cli;
 	/* options */
 	const char *mesh, *output, *camera;
-	int width, height, irradiance;
+	int size[2], irradiance;
 	struct pathtrace_options o;
 	struct exr_file_options exr;
 	/* the work */
@@ -44,7 +29,7 @@ struct reference {
 	struct cache_info info;
 	struct view_frame frame;
 	const struct camera *view;
-	char key[33];
+	char key[KEY_BYTES];
 	struct ray_scene *rays;
 	struct pathtrace *tracer;
 	FILE *results;              /* stderr when the output goes to stdout */
@@ -52,48 +37,36 @@ struct reference {
 
 /* ---- options ---- */
 
-static void compression(struct reference *r, const char *text)
-{
-	int method = file_exr_compression_by_name(text);
+#define REQUEST struct reference
 
-	if (method < 0)
-		cli_usage(&r->cli, "--compression: '%s' is none of auto, zip, zips, piz, rle, none", text);
-	r->exr.compression = (enum exr_file_compression)method;
-}
+/* What says which view is in the key as its camera and size. */
+static const struct option_spec option_table[] = {
+	{ 'c', "camera", "NAME", "camera to render", TEXT(camera), .role = OPTION_RECORDED },
+	{ 'o', "output", "FILE", "picture (EXR) or table (CSV) to write; - for standard output",
+	  TEXT(output), .role = OPTION_ASIDE },
+	{ 's', "size", "WxH", "pixels (default: 640 wide, height from the camera's aspect)",
+	  PIXELS(size), .role = OPTION_RECORDED },
+	{ 0, "irradiance", NULL, "irradiance of all element-sides by particles", FLAG(irradiance) },
+	{ 0, "samples", "N", "paths in each pixel (default: 64), or particles (1000000)",
+	  INTEGER(o.samples, 1, 1000000000000) },
+	{ 0, "centre", NULL, "sample each pixel at its centre, as trace --samples 1 does",
+	  FLAG(o.centre) },
+	{ 0, "seed", "N", "start of the random numbers (default: %s)",
+	  INTEGER(o.seed, 0, INT64_MAX), .preset = "1" },
+	{ 0, "compression", "METHOD", "%s (default), zip, zips, piz, rle or none",
+	  WORD(exr.compression, exr_file_compression_name), .preset = "auto" },
+	{ 0 }
+};
 
-static void take_option(struct reference *r, int letter)
-{
-	const struct cli *c = &r->cli;
-
-	switch (letter) {
-	case 'c': r->camera = optarg; break;
-	case 'o': r->output = optarg; break;
-	case 's':
-		if (picture_camera_parse_size(optarg, &r->width, &r->height))
-			cli_usage(c, "--size: '%s' is not a size such as 640x480", optarg);
-		break;
-	case OPT_IRRADIANCE: r->irradiance = 1; break;
-	case OPT_SAMPLES:
-		r->o.samples = cli_integer(c, "--samples", optarg, 1, 1000000000000);
-		break;
-	case OPT_SEED: r->o.seed = (uint64_t)cli_integer(c, "--seed", optarg, 0, INT64_MAX); break;
-	case OPT_CENTRE: r->o.centre = 1; break;
-	case OPT_COMPRESSION: compression(r, optarg); break;
-	}
-}
-
-static void parse(struct reference *r, int argc, char **argv)
+static void settle(struct reference *r, int operand)
 {
 	const struct cli *c = &r->cli;
-	int letter;
 
-	while ((letter = cli_next(&r->cli, argc, argv)) != -1)
-		take_option(r, letter);
-	if (argc - optind != 1)
-		cli_usage(c, argc == optind ? "a .mesh file is needed" : "one .mesh file at a time");
-	r->mesh = argv[optind];
+	if (c->argc - operand != 1)
+		cli_usage(c, c->argc == operand ? "a .mesh file is needed" : "one .mesh file at a time");
+	r->mesh = c->argv[operand];
 	cli_keep_input(c, r->output, r->mesh);
-	if (r->irradiance && (r->camera || r->width))
+	if (r->irradiance && (r->camera || r->size[0]))
 		cli_usage(c, "--irradiance has no camera and no size");
 	if (r->irradiance && r->o.centre)
 		cli_usage(c, "--irradiance has no pixels to sample at their centres");
@@ -111,20 +84,18 @@ static void parse(struct reference *r, int argc, char **argv)
 
 /* ---- what is to be made ---- */
 
-/* Everything that decides a picture's contents. */
+/* Everything a picture depends on. */
 static void picture_key(struct reference *r, const char *content)
 {
-	const int64_t number[] = { r->frame.width, r->frame.height, r->o.samples,
-		(int64_t)r->o.seed, (int64_t)r->exr.compression, r->o.centre };
-	struct digest *d = file_digest_new();
+	const int size[] = { r->frame.width, r->frame.height };
+	struct digest *d = key_begin(&r->cli, r);
 	char camera[33];
 
 	file_cache_camera_id(r->view, camera);
-	file_digest_string(d, "twopass.reference " TWOPASS_VERSION " " REVISION_VIEW);
 	file_digest_string(d, content);
 	file_digest_string(d, camera);
-	file_digest_bytes(d, number, sizeof number);
-	file_digest_end(d, r->key);
+	file_digest_bytes(d, size, sizeof size);
+	key_end(d, r->key);
 }
 
 static int choose_view(struct reference *r, const char *content, struct err *e)
@@ -138,7 +109,7 @@ static int choose_view(struct reference *r, const char *content, struct err *e)
 		return err_set(e, "%s: %s%s", r->mesh, r->camera ? "" : "a camera is needed (-c); ",
 		               why.text);
 	r->view = &r->m.camera[i];
-	if (picture_camera_frame(r->view, r->width, r->height, &r->frame, e))
+	if (picture_camera_frame(r->view, r->size[0], r->size[1], &r->frame, e))
 		return -1;
 	picture_key(r, content);
 	return 0;
@@ -191,10 +162,10 @@ static int describe(const struct reference *r, double relative, const char *hist
 }
 
 static int write_picture(const struct reference *r, double relative, const struct image *im,
-                         int argc, char **argv, struct err *e)
+                         struct err *e)
 {
 	struct exr_file_info info = { 0 };
-	char *history = file_history_append(r->info.history, argc, argv, e);
+	char *history = options_history(&r->cli, r->info.history, e);
 	int bad = !history || describe(r, relative, history, &info, e) ||
 	          file_exr_write(r->output, im, &info, &r->exr, NULL, e);
 
@@ -216,7 +187,7 @@ static void report_picture(const struct reference *r, double relative, double se
 		fprintf(r->results, "; standard error unknown\n");
 }
 
-static int make_picture(const struct reference *r, int argc, char **argv, struct err *e)
+static int make_picture(const struct reference *r, struct err *e)
 {
 	struct image im = { 0 };
 	struct cli_progress bar;
@@ -226,7 +197,7 @@ static int make_picture(const struct reference *r, int argc, char **argv, struct
 
 	cli_progress_end(&bar);
 	double seconds = cli_seconds() - begun;
-	bad = bad || write_picture(r, relative, &im, argc, argv, e);
+	bad = bad || write_picture(r, relative, &im, e);
 	picture_image_free(&im);
 	if (bad)
 		return -1;
@@ -336,16 +307,18 @@ static int make_irradiance(const struct reference *r, struct err *e)
 	return bad ? -1 : 0;
 }
 
-static int run(struct reference *r, int argc, char **argv, struct err *e)
+static int run(struct reference *r, struct err *e)
 {
 	if (read_scene(r, e))
 		return -1;
-	if (!r->irradiance && file_exr_up_to_date(r->output, r->key)) {
-		cli_note(&r->cli, "%s: up to date", r->output);
+	enum key_fit fit = r->irradiance ? KEY_DIFFERS
+	                 : file_exr_up_to_date(r->output, r->key, r->cli.any_version);
+	if (fit) {
+		key_kept(&r->cli, r->output, fit);
 		return 0;
 	}
 	if (file_atomic_check(r->output, e) || prepare(r, e) ||
-	    (r->irradiance ? make_irradiance(r, e) : make_picture(r, argc, argv, e)))
+	    (r->irradiance ? make_irradiance(r, e) : make_picture(r, e)))
 		return -1;
 	cli_detail(&r->cli, "peak memory %.0f MB", cli_peak_megabytes());
 	return 0;
@@ -358,15 +331,14 @@ int main(int argc, char **argv)
 		         .synopsis = "[options] FILE.mesh -c CAMERA -o PICTURE.exr\n"
 		                     "       reference [options] FILE.mesh --irradiance [-o TABLE.csv]",
 		         .about = "Solve a scene by unbiased Monte Carlo, to compare with.",
-		         .options = option_table, .uses_threads = 1 },
-		.o = { .seed = 1 }
+		         .options = option_table, .uses_threads = 1, .keeps_output = 1 }
 	};
 	struct err e = { 0 };
 	int status = 0;
 
 	cli_signals();
-	parse(&r, argc, argv);
-	if (run(&r, argc, argv, &e))
+	settle(&r, options_parse(&r.cli, argc, argv, &r));
+	if (run(&r, &e))
 		status = cli_fail(&r.cli, &e);
 	pathtrace_free(r.tracer);
 	ray_scene_free(r.rays);

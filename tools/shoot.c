@@ -1,5 +1,4 @@
 /* shoot: the radiosity solution from a mesh and its form factors. */
-#include <getopt.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
@@ -11,25 +10,12 @@
 #include "formats/cache/mesh_file.h"
 #include "formats/cache/rad_file.h"
 #include "formats/container/atomic_file.h"
-#include "formats/container/digest.h"
-#include "formats/container/history.h"
 #include "lib/base/mem.h"
 #include "lib/interpolate/discretisation.h"
 #include "lib/radiosity/light_groups.h"
 #include "lib/radiosity/radiosity.h"
 #include "tools/common/cli.h"
-
-enum { OPT_RESUME = 256, OPT_LOG, OPT_LIGHT_GROUPS };
-
-static const struct cli_option options[] = {
-	{ 'o', "output", "FILE", "write the solution to FILE (.rad)" },
-	{ 'e', "stop", "X", "stop when unshot / emitted flux is X everywhere (default 1e-4)" },
-	{ 'n', "shots", "N", "stop after N shots" },
-	{ OPT_LIGHT_GROUPS, "light-groups", NULL, "keep the light of each emitting material apart" },
-	{ OPT_RESUME, "resume", NULL, "go on from the solution in the output file" },
-	{ OPT_LOG, "log", "FILE", "a line a round: shots, unshot flux of each band, residual, seconds" },
-	{ 0, NULL, NULL, NULL }
-};
+#include "tools/common/key.h"
 
 struct request {
 	const char *mesh, *output, *log;
@@ -37,6 +23,22 @@ struct request {
 	size_t shards;
 	int resume, light_groups;
 	struct radiosity_options solve;
+};
+
+#define REQUEST struct request
+
+static const struct option_spec options[] = {
+	{ 'o', "output", "FILE", "write the solution to FILE (.rad)", TEXT(output),
+	  .role = OPTION_ASIDE },
+	{ 'e', "stop", "X", "stop when unshot / emitted flux is X everywhere (default %s)",
+	  NUMBER(solve.stop, 0, 1), .preset = "1e-4" },
+	{ 'n', "shots", "N", "stop after N shots", INTEGER(solve.max_shots, 0, INT64_MAX) },
+	{ 0, "light-groups", NULL, "keep the light of each emitting material apart",
+	  FLAG(light_groups) },
+	{ 0, "resume", NULL, "go on from the solution in the output file", FLAG(resume) },
+	{ 0, "log", "FILE", "a line a round: shots, unshot flux of each band, residual, seconds",
+	  TEXT(log), .role = OPTION_RECORDED },
+	{ 0 }
 };
 
 struct job {
@@ -56,32 +58,17 @@ struct job {
 	double prepare_seconds, solve_seconds, gather_seconds, estimate_seconds;
 };
 
-static void parse(struct cli *c, int argc, char **argv, struct request *r)
+static void settle(struct cli *c, int operand, struct request *r)
 {
-	int letter;
-
-	r->solve = RADIOSITY_OPTIONS_DEFAULT;
-	while ((letter = cli_next(c, argc, argv)) != -1) {
-		switch (letter) {
-		case 'o': r->output = optarg; break;
-		case 'e': r->solve.stop = cli_number(c, "--stop", optarg, 0, 1); break;
-		case 'n':
-			r->solve.max_shots = (uint64_t)cli_integer(c, "--shots", optarg, 0, INT64_MAX);
-			break;
-		case OPT_LIGHT_GROUPS: r->light_groups = 1; break;
-		case OPT_RESUME: r->resume = 1; break;
-		case OPT_LOG: r->log = optarg; break;
-		}
-	}
-	if (argc - optind < 2)
+	if (c->argc - operand < 2)
 		cli_usage(c, "a .mesh file and at least one .ff file are needed");
 	if (!r->output)
 		cli_usage(c, "an output is needed: -o FILE.rad");
-	for (int i = optind; i < argc; i++)
-		cli_keep_input(c, r->output, argv[i]);
-	r->mesh = argv[optind];
-	r->ff = argv + optind + 1;
-	r->shards = (size_t)(argc - optind - 1);
+	for (int i = operand; i < c->argc; i++)
+		cli_keep_input(c, r->output, c->argv[i]);
+	r->mesh = c->argv[operand];
+	r->ff = c->argv + operand + 1;
+	r->shards = (size_t)(c->argc - operand - 1);
 	r->solve.threads = c->threads;
 }
 
@@ -122,12 +109,12 @@ static int open_inputs(struct job *j, struct err *e)
 }
 
 /* Everything the solution depends on; cameras are looked after apart. */
-static void make_key(const struct job *j, char key[33])
+static void make_key(const struct job *j, char key[KEY_BYTES])
 {
-	struct digest *d = file_digest_new();
+	struct digest *d = key_begin(j->cli, j->r);
 	const struct model *m = &j->m;
+	char content[33];
 
-	file_digest_string(d, "shoot " TWOPASS_VERSION " " REVISION_RAD);
 	file_digest_string(d, j->mesh.geometry_id);
 	file_digest_string(d, j->mesh.material_id);
 	for (size_t i = 0; i < m->surface.n; i++)
@@ -136,10 +123,11 @@ static void make_key(const struct job *j, char key[33])
 		file_digest_string(d, m->material.name[i]);
 	file_digest_bytes(d, m->triangle.uv, 6 * m->triangle.n * sizeof *m->triangle.uv);
 	file_digest_bytes(d, m->triangle.normal, 9 * m->triangle.n * sizeof *m->triangle.normal);
-	for (size_t i = 0; i < j->r->shards; i++)
-		file_digest_string(d, j->file[i].info.key ? j->file[i].info.key : "");
-	file_digest_string(d, j->info.options);
-	file_digest_end(d, key);
+	for (size_t i = 0; i < j->r->shards; i++) {
+		file_container_digest(j->file[i].container, content);
+		file_digest_string(d, content);
+	}
+	key_end(d, key);
 }
 
 static char *options_text(const struct request *r)
@@ -170,15 +158,15 @@ static int kept(struct job *j, const char *key, struct err *e)
 	struct solution s = { 0 };
 	struct cache_info info = { 0 };
 	int same_cameras, status;
+	enum key_fit fit = file_cache_up_to_date(j->r->output, "twopass.rad", key, j->cli->any_version);
 
-	if (!file_cache_up_to_date(j->r->output, "twopass.rad", key) ||
-	    !(c = file_container_open(j->r->output, "twopass.rad", &ignored)))
+	if (!fit || !(c = file_container_open(j->r->output, "twopass.rad", &ignored)))
 		return 0;
 	const char *camera_id = file_container_get_meta(c, "camera_id");
 	same_cameras = camera_id && strcmp(camera_id, j->mesh.camera_id) == 0;
 	file_container_close(c);
 	if (same_cameras) {
-		cli_note(j->cli, "%s: up to date", j->r->output);
+		key_kept(j->cli, j->r->output, fit);
 		return 1;
 	}
 	if (file_rad_read(j->r->output, &old, &s, &info, &ignored))
@@ -188,6 +176,8 @@ static int kept(struct job *j, const char *key, struct err *e)
 	status = file_rad_write(j->r->output, &j->m, &s, &info, e);
 	if (status == 0)
 		cli_note(j->cli, "%s: cameras replaced, solution kept", j->r->output);
+	if (status == 0 && fit != KEY_FITS)
+		key_kept(j->cli, j->r->output, fit);
 	model_free(&old);
 	solution_free(&s);
 	file_cache_info_free(&info);
@@ -386,16 +376,16 @@ static int make(struct job *j, struct err *e)
 	return file_rad_write(j->r->output, &j->m, &j->s, &j->info, e);
 }
 
-static int run(struct job *j, int argc, char **argv, struct err *e)
+static int run(struct job *j, struct err *e)
 {
-	char key[33];
+	char key[KEY_BYTES];
 	int done;
 
 	j->begun = cli_seconds();
 	if (file_atomic_check(j->r->output, e) || open_inputs(j, e))
 		return -1;
 	j->info.options = options_text(j->r);
-	j->info.history = file_history_append(j->file[0].info.history, argc, argv, e);
+	j->info.history = options_history(j->cli, j->file[0].info.history, e);
 	if (!j->info.history)
 		return -1;
 	make_key(j, key);
@@ -429,15 +419,15 @@ int main(int argc, char **argv)
 {
 	struct cli c = { .program = "shoot", .synopsis = "[OPTION]... -o FILE.rad FILE.mesh FILE.ff...",
 	                 .about = "Solves for the light in a scene by progressive shooting.",
-	                 .options = options, .uses_threads = 1 };
-	struct request r = { 0 };
+	                 .options = options, .uses_threads = 1, .keeps_output = 1 };
+	struct request r = { .solve.max_shots = UINT64_MAX };
 	struct job j = { .cli = &c, .r = &r };
 	struct err e = { 0 };
 	int status;
 
-	parse(&c, argc, argv, &r);
+	settle(&c, options_parse(&c, argc, argv, &r), &r);
 	cli_signals();
-	status = run(&j, argc, argv, &e) ? cli_fail(&c, &e) : 0;
+	status = run(&j, &e) ? cli_fail(&c, &e) : 0;
 	job_free(&j);
 	return cli_finish(&c, status);
 }

@@ -1,5 +1,4 @@
 /* trace: the view-dependent pass; pictures of a solved scene. */
-#include <getopt.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -10,55 +9,24 @@
 #include "formats/cache/camera_file.h"
 #include "formats/cache/rad_file.h"
 #include "formats/container/atomic_file.h"
-#include "formats/container/digest.h"
-#include "formats/container/history.h"
 #include "formats/picture/exr_file.h"
 #include "lib/base/mem.h"
 #include "lib/picture/camera.h"
 #include "lib/radiosity/light_groups.h"
 #include "lib/view/view.h"
 #include "tools/common/cli.h"
+#include "tools/common/key.h"
 #include "tools/common/pattern.h"
 
-enum { OPT_EYE = 256, OPT_TARGET, OPT_UP, OPT_FOV, OPT_SAMPLES, OPT_LOBE_SAMPLES, OPT_DEPTH,
-       OPT_CUTOFF, OPT_HALF, OPT_COMPRESSION, OPT_LAYERS, OPT_MIX, OPT_GATHER_RAYS,
-       OPT_BUDGET };
-
-/* At most, where an error is aimed at. */
-enum { TARGET_SAMPLES = 64 };
-
-static const struct cli_option option_table[] = {
-	{ 'c', "camera", "NAME", "camera to render; repeatable, or 'all'" },
-	{ 'o', "output", "FILE", "picture to write (EXR); %s stands for the camera's name" },
-	{ 's', "size", "WxH", "pixels (default: 640 wide, height from the camera's aspect)" },
-	{ OPT_EYE, "eye", "X,Y,Z", "render a view from this point" },
-	{ OPT_TARGET, "target", "X,Y,Z", "point it looks at" },
-	{ OPT_UP, "up", "X,Y,Z", "its upright direction (default: 0,1,0)" },
-	{ OPT_FOV, "fov", "DEGREES", "its vertical field of view (default: 50)" },
-	{ 'd', "diffuse", "METHOD", "where diffuse light comes from: mesh, direct (default), gather" },
-	{ 't', "error", "X", "relative standard error of pixels at which sampling stops" },
-	{ OPT_BUDGET, "budget", "SECONDS", "as many samples and rays as fit in, for each picture" },
-	{ OPT_SAMPLES, "samples", "N", "positions in each pixel (default: 4; 1: its centre)" },
-	{ OPT_LOBE_SAMPLES, "lobe-samples", "N",
-	  "samples of a finite lobe (default: by their noise; 0: one ray about its axis)" },
-	{ OPT_GATHER_RAYS, "gather-rays", "N", "rays that -d gather takes at a point (default: 1024)" },
-	{ OPT_DEPTH, "depth", "N", "directional events that are followed (default: 32)" },
-	{ OPT_CUTOFF, "cutoff", "X", "cut tails that carry less than this part (default: 0.001)" },
-	{ OPT_LAYERS, "layers", "LIST",
-	  "also diffuse,directional,emission,Z,N,element,patch or all" },
-	{ OPT_HALF, "half", NULL, "colours as 16-bit floats" },
-	{ OPT_COMPRESSION, "compression", "METHOD", "auto (default), zip, zips, piz, rle or none" },
-	{ OPT_MIX, "mix", "NAME=X,...",
-	  "scale the light of groups by X, or X:X:X for each band" },
-	{ 0, NULL, NULL, NULL }
-};
+/* Where they are not given; samples at most where an error is aimed at. */
+enum { SAMPLES = 4, TARGET_SAMPLES = 64, GATHER_RAYS = 1024 };
 
 /* A picture to be made. */
 struct shot {
 	const struct camera *camera;
 	struct view_frame frame;
 	char *path;
-	char key[33];
+	char key[KEY_BYTES];
 	int done;
 };
 
@@ -67,10 +35,9 @@ struct trace {
 	/* options */
 	const char *rad, *output;
 	char *mix;                  /* of all --mix together */
-	const char **camera;        /* [cameras] names asked for */
-	int cameras, all;
-	int width, height;
-	int has_eye, has_target, has_up;
+	struct option_list camera;  /* names asked for */
+	int all;                    /* 1: every camera, as one of them says */
+	int size[2];                /* of the picture, or 0 */
 	double eye[3], target[3], up[3], fov;
 	enum view_method method;
 	double budget;              /* seconds for a picture; 0: not given */
@@ -94,127 +61,76 @@ struct trace {
 
 /* ---- options ---- */
 
-/* Always 1: an option that is there. */
-static int vector(const struct cli *c, const char *option, const char *text, double v[3])
-{
-	char extra;
+#define REQUEST struct trace
 
-	if (sscanf(text, "%lf,%lf,%lf%c", &v[0], &v[1], &v[2], &extra) != 3 ||
-	    !isfinite(v[0] + v[1] + v[2]))
-		cli_usage(c, "%s: '%s' is not three numbers X,Y,Z", option, text);
-	return 1;
-}
+static const char *const methods[] = { "mesh", "direct", "gather", NULL };
 
-static void diffuse_method(struct trace *t, const char *text)
-{
-	static const char *const name[] = { "mesh", "direct", "gather" };
+/* What says which views there are is in the key as camera and size of each. */
+static const struct option_spec option_table[] = {
+	{ 'c', "camera", "NAME", "camera to render; repeatable, or 'all'", LIST(camera),
+	  .role = OPTION_RECORDED },
+	{ 'o', "output", "FILE", "picture to write (EXR); %s stands for the camera's name",
+	  TEXT(output), .role = OPTION_ASIDE },
+	{ 's', "size", "WxH", "pixels (default: 640 wide, height from the camera's aspect)",
+	  PIXELS(size), .role = OPTION_RECORDED },
+	{ 0, "eye", "X,Y,Z", "render a view from this point", VECTOR(eye), .role = OPTION_RECORDED },
+	{ 0, "target", "X,Y,Z", "point it looks at", VECTOR(target), .role = OPTION_RECORDED },
+	{ 0, "up", "X,Y,Z", "its upright direction (default: %s)", VECTOR(up), .preset = "0,1,0",
+	  .role = OPTION_RECORDED },
+	{ 0, "fov", "DEGREES", "its vertical field of view (default: %s)", NUMBER(fov, 1e-3, 179.9),
+	  .preset = "50", .role = OPTION_RECORDED },
+	{ 'd', "diffuse", "METHOD",
+	  "where diffuse light comes from: mesh, %s (default), gather", WORD(method, methods),
+	  .preset = "direct" },
+	{ 't', "error", "X", "relative standard error of pixels at which sampling stops",
+	  NUMBER(view.relative, 1e-6, 1) },
+	{ 0, "budget", "SECONDS", "as many samples and rays as fit in, for each picture",
+	  NUMBER(budget, 1e-3, 1e9) },
+	{ 0, "samples", "N", "positions in each pixel (default: 4; 1: its centre)",
+	  INTEGER(view.samples, 1, 1 << 16) },
+	{ 0, "lobe-samples", "N",
+	  "samples of a finite lobe (default: by their noise; 0: one ray about its axis)",
+	  INTEGER(view.lobe_samples, 0, 1 << 16) },
+	{ 0, "gather-rays", "N", "rays that -d gather takes at a point (default: 1024)",
+	  INTEGER(view.gather_rays, 4, 1 << 20) },
+	{ 0, "depth", "N", "directional events that are followed (default: %s)",
+	  INTEGER(view.depth, 0, 100000), .preset = "32" },
+	{ 0, "cutoff", "X", "cut tails that carry less than this part (default: %s)",
+	  NUMBER(view.cutoff, 0, 1), .preset = "0.001" },
+	{ 0, "layers", "LIST",
+	  "also diffuse,directional,emission,Z,N,element,patch,error or all",
+	  SET(view.layers, view_layer_name) },
+	{ 0, "half", NULL, "colours as 16-bit floats", FLAG(exr.half) },
+	{ 0, "compression", "METHOD", "%s (default), zip, zips, piz, rle or none",
+	  WORD(exr.compression, exr_file_compression_name), .preset = "auto" },
+	{ 0, "mix", "NAME=X,...", "scale the light of groups by X, or X:X:X for each band",
+	  JOINED(mix) },
+	{ 0 }
+};
 
-	for (int i = 0; i < 3; i++)
-		if (strcmp(text, name[i]) == 0) {
-			t->method = (enum view_method)i;
-			return;
-		}
-	cli_usage(&t->cli, "--diffuse: there is no method '%s'; use mesh, direct or gather", text);
-}
-
-static void compression(struct trace *t, const char *text)
-{
-	int method = file_exr_compression_by_name(text);
-
-	if (method < 0)
-		cli_usage(&t->cli, "--compression: '%s' is none of auto, zip, zips, piz, rle, none", text);
-	t->exr.compression = (enum exr_file_compression)method;
-}
-
-/* Appends to what was to be mixed before. */
-static void take_mix(struct trace *t, const char *more)
-{
-	size_t n = t->mix ? strlen(t->mix) : 0, size = n + strlen(more) + 2;
-	char *mix = realloc(t->mix, size);
-	struct err e = { 0 };
-
-	if (!mix) {
-		err_set(&e, "out of memory for --mix");
-		exit(cli_fail(&t->cli, &e));
-	}
-	snprintf(mix + n, size - n, "%s%s", n ? "," : "", more);
-	t->mix = mix;
-}
-
-static void take_camera(struct trace *t, const char *name)
-{
-	if (strcmp(name, "all") == 0)
-		t->all = 1;
-	else
-		t->camera[t->cameras++] = name;
-}
-
-static void take_option(struct trace *t, int letter)
+static void settle(struct trace *t, int operand)
 {
 	const struct cli *c = &t->cli;
+	int has_eye = options_given(c, "eye");
 
-	switch (letter) {
-	case 'c': take_camera(t, optarg); break;
-	case 'o': t->output = optarg; break;
-	case 's':
-		if (picture_camera_parse_size(optarg, &t->width, &t->height))
-			cli_usage(c, "--size: '%s' is not a size such as 640x480", optarg);
-		break;
-	case 'd': diffuse_method(t, optarg); break;
-	case OPT_EYE: t->has_eye = vector(c, "--eye", optarg, t->eye); break;
-	case OPT_TARGET: t->has_target = vector(c, "--target", optarg, t->target); break;
-	case OPT_UP: t->has_up = vector(c, "--up", optarg, t->up); break;
-	case OPT_FOV: t->fov = cli_number(c, "--fov", optarg, 1e-3, 179.9); break;
-	case 't': t->view.relative = cli_number(c, "-t", optarg, 1e-6, 1); break;
-	case OPT_BUDGET: t->budget = cli_number(c, "--budget", optarg, 1e-3, 1e9); break;
-	case OPT_SAMPLES:
-		t->view.samples = (int)cli_integer(c, "--samples", optarg, 1, 1 << 16);
-		break;
-	case OPT_LOBE_SAMPLES:
-		t->view.lobe_samples = (int)cli_integer(c, "--lobe-samples", optarg, 0, 1 << 16);
-		break;
-	case OPT_GATHER_RAYS:
-		t->view.gather_rays = (int)cli_integer(c, "--gather-rays", optarg, 4, 1 << 20);
-		break;
-	case OPT_DEPTH:
-		t->view.depth = (int)cli_integer(c, "--depth", optarg, 0, 100000);
-		break;
-	case OPT_CUTOFF: t->view.cutoff = cli_number(c, "--cutoff", optarg, 0, 1); break;
-	case OPT_MIX: take_mix(t, optarg); break;
-	case OPT_HALF: t->exr.half = 1; break;
-	case OPT_COMPRESSION: compression(t, optarg); break;
-	case OPT_LAYERS:
-		if (view_parse_layers(optarg, &t->view.layers))
-			cli_usage(c, "--layers: '%s' is not a list of diffuse, directional, emission, "
-			          "Z, N, element, patch, error or all", optarg);
-		break;
-	}
-}
-
-static void parse(struct trace *t, int argc, char **argv)
-{
-	const struct cli *c = &t->cli;
-	int letter;
-
-	while ((letter = cli_next(&t->cli, argc, argv)) != -1)
-		take_option(t, letter);
-	if (argc - optind != 1)
-		cli_usage(c, argc == optind ? "a .rad file is needed" : "one .rad file at a time");
-	t->rad = argv[optind];
+	if (c->argc - operand != 1)
+		cli_usage(c, c->argc == operand ? "a .rad file is needed" : "one .rad file at a time");
+	t->rad = c->argv[operand];
 	cli_keep_input(c, t->output, t->rad);
 	if (!t->output)
 		cli_usage(c, "-o is needed: the picture to write");
-	if (t->has_eye != t->has_target)
+	if (has_eye != options_given(c, "target"))
 		cli_usage(c, "--eye and --target go together");
-	if (!t->has_eye && (t->has_up || t->fov > 0))
+	if (!has_eye && (options_given(c, "up") || options_given(c, "fov")))
 		cli_usage(c, "--up and --fov belong to a view by --eye and --target");
 	if (t->budget > 0 && (t->view.relative > 0 || t->view.samples || t->view.gather_rays))
 		cli_usage(c, "--budget goes without -t, --samples and --gather-rays, which it chooses");
 	if (!t->view.samples)
-		t->view.samples = t->view.relative > 0 ? TARGET_SAMPLES
-		                                        : VIEW_OPTIONS_DEFAULT.samples;
+		t->view.samples = t->view.relative > 0 ? TARGET_SAMPLES : SAMPLES;
 	if (!t->view.gather_rays)
-		t->view.gather_rays = VIEW_OPTIONS_DEFAULT.gather_rays;
+		t->view.gather_rays = GATHER_RAYS;
+	for (size_t i = 0; i < t->camera.n; i++)
+		t->all |= strcmp(t->camera.item[i], "all") == 0;
 	t->view.threads = t->cli.threads;
 	t->results = strcmp(t->output, "-") == 0 ? stderr : stdout;
 }
@@ -223,39 +139,29 @@ static void parse(struct trace *t, int argc, char **argv)
 
 static int ad_hoc_camera(struct trace *t, struct err *e)
 {
-	static const double y[3] = { 0, 1, 0 }, minus_z[3] = { 0, 0, -1 };
-	double fov = t->fov > 0 ? t->fov : CAMERA_FOV;
-	struct err steep = { 0 };
+	static const double minus_z[3] = { 0, 0, -1 };
+	struct err steep = { 0 }, *why = options_given(&t->cli, "up") ? e : &steep;
 
-	if (t->has_up) {
-		if (picture_camera_look_at(t->eye, t->target, t->up, fov, &t->ad_hoc, e))
-			return -1;
-	} else if (picture_camera_look_at(t->eye, t->target, y, fov, &t->ad_hoc, &steep) &&
-	           picture_camera_look_at(t->eye, t->target, minus_z, fov, &t->ad_hoc, e)) {
-		return -1; /* -Z would do for looking straight up or down */
-	}
+	/* -Z does for looking straight up or down. */
+	if (picture_camera_look_at(t->eye, t->target, t->up, t->fov, &t->ad_hoc, why) &&
+	    (why == e || picture_camera_look_at(t->eye, t->target, minus_z, t->fov, &t->ad_hoc, e)))
+		return -1;
 	t->ad_hoc.name = mem_new(1, sizeof "view", "name", e);
 	return t->ad_hoc.name ? (void)strcpy(t->ad_hoc.name, "view"), 0 : -1;
 }
 
-/* Everything that decides a picture's contents. */
+/* Everything a picture depends on. */
 static void picture_key(const struct trace *t, struct shot *s)
 {
-	const struct view_options *v = &t->view;
-	const double number[] = { s->frame.width, s->frame.height, v->samples, v->lobe_samples,
-		v->depth, v->cutoff, v->layers, t->method, v->gather_rays, v->relative, t->budget,
-		t->exr.compression, t->exr.half };
+	const int size[] = { s->frame.width, s->frame.height };
+	struct digest *d = key_begin(&t->cli, t);
 	char camera[33];
-	struct digest *d = file_digest_new();
 
 	file_cache_camera_id(s->camera, camera);
-	file_digest_string(d, "twopass.exr " TWOPASS_VERSION " " REVISION_VIEW);
 	file_digest_string(d, t->content);
 	file_digest_string(d, camera);
-	file_digest_bytes(d, number, sizeof number);
-	if (t->mix)
-		file_digest_string(d, t->mix);
-	file_digest_end(d, s->key);
+	file_digest_bytes(d, size, sizeof size);
+	key_end(d, s->key);
 }
 
 static int add_shot(struct trace *t, const struct camera *c, struct err *e)
@@ -264,7 +170,7 @@ static int add_shot(struct trace *t, const struct camera *c, struct err *e)
 
 	s->camera = c;
 	s->path = pattern_fill(t->output, c->name, e);
-	if (!s->path || picture_camera_frame(c, t->width, t->height, &s->frame, e))
+	if (!s->path || picture_camera_frame(c, t->size[0], t->size[1], &s->frame, e))
 		return -1;
 	for (const struct shot *p = t->shot; p < s; p++)
 		if (strcmp(p->path, s->path) == 0)
@@ -277,21 +183,22 @@ static int add_shot(struct trace *t, const struct camera *c, struct err *e)
 static int list_shots(struct trace *t, struct err *e)
 {
 	const struct model *m = &t->cameras_of;
+	int has_eye = options_given(&t->cli, "eye");
 
-	t->shot = mem_new(m->cameras + (size_t)t->cameras + 1, sizeof *t->shot, "views", e);
-	if (!t->shot || (t->has_eye && (ad_hoc_camera(t, e) || add_shot(t, &t->ad_hoc, e))))
+	t->shot = mem_new(m->cameras + t->camera.n + 1, sizeof *t->shot, "views", e);
+	if (!t->shot || (has_eye && (ad_hoc_camera(t, e) || add_shot(t, &t->ad_hoc, e))))
 		return -1;
 	if (t->all && m->cameras == 0)
 		return err_set(e, "%s: has no cameras; give a view by --eye and --target", t->rad);
 	/* A scene's only camera need not be named. */
-	if (!t->has_eye && !t->all && t->cameras == 0 && m->cameras == 1)
+	if (!has_eye && !t->all && t->camera.n == 0 && m->cameras == 1)
 		t->all = 1;
 	for (size_t i = 0; i < m->cameras && t->all; i++)
 		if (add_shot(t, &m->camera[i], e))
 			return -1;
-	for (int i = 0; i < t->cameras && !t->all; i++) {
+	for (size_t i = 0; i < t->camera.n && !t->all; i++) {
 		struct err why = { 0 };
-		int k = picture_camera_find(m, t->camera[i], &why);
+		int k = picture_camera_find(m, t->camera.item[i], &why);
 		if (k < 0)
 			return err_set(e, "%s: %s", t->rad, why.text);
 		if (add_shot(t, &m->camera[k], e))
@@ -319,7 +226,7 @@ static int plan(struct trace *t, struct err *e)
 
 /* ---- the work ---- */
 
-static int read_scene(struct trace *t, int argc, char **argv, struct err *e)
+static int read_scene(struct trace *t, struct err *e)
 {
 	double begun = cli_seconds();
 	struct err why = { 0 };
@@ -328,7 +235,7 @@ static int read_scene(struct trace *t, int argc, char **argv, struct err *e)
 		return -1;
 	if (t->mix && radiosity_groups_mix(&t->s, &t->m, t->mix, &why))
 		return err_set(e, "%s: --mix: %s", t->rad, why.text);
-	t->history = file_history_append(t->info.history, argc, argv, e);
+	t->history = options_history(&t->cli, t->info.history, e);
 	double read = cli_seconds();
 	t->rays = ray_scene_new(&t->m, e);
 	if (!t->history || !t->rays)
@@ -428,7 +335,7 @@ static int render_within(const struct trace *t, const struct shot *s, const stru
 		picture_image_free(im);
 		*im = (struct image){ 0 };
 		o.samples = 1 << level;
-		o.gather_rays = VIEW_OPTIONS_DEFAULT.gather_rays / 8 << level;
+		o.gather_rays = GATHER_RAYS / 8 << level;
 		bad = view_render(t->scene, &s->frame, &o, progress, im, v, e);
 		double now = cli_seconds(), left = t->budget - (now - begun);
 		double more = now > last ? .9 * left / (now - last) : 0;
@@ -468,23 +375,24 @@ static int render(const struct trace *t, const struct shot *s, struct err *e)
 	return 0;
 }
 
-static int run(struct trace *t, int argc, char **argv, struct err *e)
+static int run(struct trace *t, struct err *e)
 {
 	size_t left = 0;
 
 	if (plan(t, e))
 		return -1;
 	for (struct shot *s = t->shot; s < t->shot + t->shots; s++) {
-		s->done = file_exr_up_to_date(s->path, s->key);
+		enum key_fit fit = file_exr_up_to_date(s->path, s->key, t->cli.any_version);
+		s->done = fit != KEY_DIFFERS;
 		left += !s->done;
 		if (s->done)
-			cli_note(&t->cli, "%s: up to date", s->path);
+			key_kept(&t->cli, s->path, fit);
 		else if (file_atomic_check(s->path, e))
 			return -1;
 	}
 	if (left == 0)
 		return 0;
-	if (read_scene(t, argc, argv, e))
+	if (read_scene(t, e))
 		return -1;
 	for (const struct shot *s = t->shot; s < t->shot + t->shots; s++)
 		if (!s->done && render(t, s, e))
@@ -499,7 +407,7 @@ static void release(struct trace *t)
 	for (size_t i = 0; i < t->shots; i++)
 		free(t->shot[i].path);
 	free(t->shot);
-	free(t->camera);
+	free(t->camera.item);
 	free(t->mix);
 	free(t->ad_hoc.name);
 	free(t->history);
@@ -516,20 +424,15 @@ int main(int argc, char **argv)
 	struct trace t = {
 		.cli = { .program = "trace", .synopsis = "[options] FILE.rad -o PICTURE.exr",
 		         .about = "Render views of a solved scene, following mirrors, panes and lobes.",
-		         .options = option_table, .uses_threads = 1 },
-		.method = VIEW_DIRECT,
-		.view = VIEW_OPTIONS_DEFAULT
+		         .options = option_table, .uses_threads = 1, .keeps_output = 1 },
+		.view.lobe_samples = VIEW_LOBE_ENOUGH
 	};
 	struct err e = { 0 };
 	int status = 0;
 
-	t.view.samples = t.view.gather_rays = 0; /* not given */
 	cli_signals();
-	t.camera = mem_new((size_t)argc, sizeof *t.camera, "camera names", &e);
-	if (!t.camera)
-		return cli_fail(&t.cli, &e);
-	parse(&t, argc, argv);
-	if (run(&t, argc, argv, &e))
+	settle(&t, options_parse(&t.cli, argc, argv, &t));
+	if (run(&t, &e))
 		status = cli_fail(&t.cli, &e);
 	release(&t);
 	return cli_finish(&t.cli, status);

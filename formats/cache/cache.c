@@ -291,19 +291,19 @@ int file_cache_read_names(const struct container *c, const char *key, char ***na
 	return -1;
 }
 
-int file_cache_up_to_date(const char *path, const char *format, const char *key)
+enum key_fit file_cache_up_to_date(const char *path, const char *format, const char *key,
+                                   int any_version)
 {
 	struct err ignored = { 0 };
 	struct container *c = file_container_open(path, format, &ignored);
-	const char *version, *have;
+	enum key_fit fit = KEY_DIFFERS;
 
 	if (!c)
-		return 0;
-	version = file_container_get_meta(c, "version");
-	have = file_container_get_meta(c, "key");
-	int same = version && strcmp(version, version_of(format)) == 0 && have && *have &&
-	           strcmp(have, key) == 0;
+		return KEY_DIFFERS;
+	const char *version = file_container_get_meta(c, "version");
+	if (version && strcmp(version, version_of(format)) == 0)
+		fit = key_fit(file_container_get_meta(c, "key"), key, any_version);
 	file_container_close(c);
 	/* make(1) must see it newer than what it was made from. */
-	return same && utimensat(AT_FDCWD, path, NULL, 0) == 0;
+	return fit && utimensat(AT_FDCWD, path, NULL, 0) ? KEY_DIFFERS : fit;
 }

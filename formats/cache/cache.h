@@ -3,25 +3,19 @@
 #define TWOPASS_CACHE_H
 
 #include "formats/container/container.h"
+#include "formats/container/key.h"
 #include "lib/base/err.h"
 #include "lib/data/model.h"
 
 #define CACHE_VERSION "2"    /* of .mesh and .rad files */
 #define CACHE_FF_VERSION "4" /* of .ff files */
 
-/* Part of the key of each stage's output. To be raised whenever a stage makes something
- * else of the same input and options, so that what older programs left is made anew. */
-#define REVISION_MESH "7"
-#define REVISION_FF "17"
-#define REVISION_RAD "13"
-#define REVISION_VIEW "10"
-
 /* Strings are owned (malloc) and may be NULL. */
 struct cache_info {
 	char *history;         /* commands, one per line */
 	char *options;         /* the tool's options as a JSON object */
 	char *report;          /* what was modelled, counts, errors, as JSON */
-	char *key;             /* digest of inputs and options: equal keys, equal output */
+	char *key;             /* container/key.h: equal keys, equal output */
 	char geometry_id[33];  /* all that form factors depend on */
 	char material_id[33];  /* coefficients, emission, intensities of lights */
 	char camera_id[33];    /* all cameras */
@@ -54,8 +48,9 @@ int file_cache_read_names(const struct container *c, const char *key, char ***na
                           struct err *e);
 void file_cache_names_free(char **name, size_t n);
 
-/* 1 if `path` exists, is a whole container of this format (structure and header
- * digest checked) and its key is `key`: then the file is touched (mtime now). */
-int file_cache_up_to_date(const char *path, const char *format, const char *key);
+/* Whether `path` exists, is a whole container of this format (structure and header digest
+ * checked) and its key fits: then the file is touched (mtime now). */
+enum key_fit file_cache_up_to_date(const char *path, const char *format, const char *key,
+                                   int any_version);
 
 #endif

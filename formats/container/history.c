@@ -100,35 +100,40 @@ static int put_argument(struct vec *line, const char *arg, struct err *e)
 	return n ? put_quoted(line, begin, n, e) : 0;
 }
 
-/* getopt_long takes abbreviations; three letters tell these from others. */
-static enum left_out long_option(const char *arg)
+/* getopt_long takes abbreviations that stand for one option only. */
+static enum left_out long_option(const char *arg, const struct history_option *aside)
 {
-	static const struct {
-		const char *name;
-		enum left_out what;
-	} known[] = { { "quiet", DROP }, { "verbose", DROP },
-	              { "threads", DROP_WITH_NEXT }, { "output", DROP_WITH_NEXT } };
 	size_t n = strcspn(arg + 2, "=");
 
-	for (size_t i = 0; i < sizeof known / sizeof *known; i++)
-		if (n >= 3 && strncmp(arg + 2, known[i].name, n) == 0)
-			return arg[2 + n] == '=' ? DROP : known[i].what;
+	for (; n && aside->name; aside++)
+		if (strncmp(arg + 2, aside->name, n) == 0)
+			return aside->argument && !arg[2 + n] ? DROP_WITH_NEXT : DROP;
 	return KEEP;
 }
 
-/* A cluster of short options: leading q and v go, then j or o with its value.
- * *rest is what is left of it ("" if nothing). */
-static enum left_out short_options(const char *arg, const char **rest)
+static const struct history_option *find_letter(const struct history_option *aside, char letter)
 {
-	const char *p = arg + 1 + strspn(arg + 1, "qv");
-
-	*rest = p;
-	if (*p == 'j' || *p == 'o')
-		return p[1] ? DROP : DROP_WITH_NEXT;
-	return *p ? KEEP : DROP;
+	for (; letter && aside->name; aside++)
+		if (aside->letter == letter)
+			return aside;
+	return NULL;
 }
 
-static int put_command(struct vec *line, int argc, char *const argv[], struct err *e)
+/* A cluster of short options: leading ones that are to be left out go, the last of them
+ * perhaps with its value. *rest is what is left of it ("" if nothing). */
+static enum left_out short_options(const char *arg, const struct history_option *aside,
+                                   const char **rest)
+{
+	const struct history_option *o;
+
+	for (*rest = arg + 1; (o = find_letter(aside, **rest)); ++*rest)
+		if (o->argument)
+			return (*rest)[1] ? DROP : DROP_WITH_NEXT;
+	return **rest ? KEEP : DROP;
+}
+
+static int put_command(struct vec *line, int argc, char *const argv[],
+                       const struct history_option *aside, struct err *e)
 {
 	int operands_only = 0;
 	const char *begin, *rest;
@@ -142,9 +147,9 @@ static int put_command(struct vec *line, int argc, char *const argv[], struct er
 		enum left_out what = KEEP;
 		if (!operands_only && strncmp(arg, "--", 2) == 0) {
 			operands_only = !arg[2];
-			what = long_option(arg);
+			what = long_option(arg, aside);
 		} else if (!operands_only && arg[0] == '-' && arg[1]) {
-			what = short_options(arg, &rest);
+			what = short_options(arg, aside, &rest);
 			if (what == KEEP && rest > arg + 1) {
 				if (put(line, " -", 2, e) || put_quoted(line, rest, strlen(rest), e))
 					return -1;
@@ -159,7 +164,8 @@ static int put_command(struct vec *line, int argc, char *const argv[], struct er
 	return 0;
 }
 
-char *file_history_append(const char *before, int argc, char *const argv[], struct err *e)
+char *file_history_append(const char *before, int argc, char *const argv[],
+                          const struct history_option *aside, struct err *e)
 {
 	struct vec line = { 0 };
 	size_t n = before ? strlen(before) : 0;
@@ -167,7 +173,7 @@ char *file_history_append(const char *before, int argc, char *const argv[], stru
 	while (n && before[n - 1] == '\n')
 		n--;
 	if ((n && (put(&line, before, n, e) || put(&line, "\n", 1, e))) ||
-	    put_command(&line, argc, argv, e) || put(&line, "", 1, e)) {
+	    put_command(&line, argc, argv, aside, e) || put(&line, "", 1, e)) {
 		free(line.data);
 		return NULL;
 	}

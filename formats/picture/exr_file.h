@@ -4,6 +4,7 @@
 
 #include <stddef.h>
 
+#include "formats/container/key.h"
 #include "lib/base/err.h"
 #include "lib/picture/image.h"
 
@@ -23,7 +24,7 @@ struct exr_file_info {
 /* Names of string attributes with a fixed meaning. */
 #define EXR_FILE_CAMERA "camera"   /* name of the camera */
 #define EXR_FILE_HISTORY "history" /* commands, one per line */
-#define EXR_FILE_KEY "twopassKey"  /* digest of inputs and options */
+#define EXR_FILE_KEY "twopassKey"  /* container/key.h */
 
 /* Adds or replaces a string. 0, or -1 and e. O(strings). */
 int file_exr_info_set(struct exr_file_info *i, const char *name, const char *value,
@@ -38,8 +39,8 @@ enum exr_file_compression {
 	EXR_FILE_ZIPS, EXR_FILE_PIZ, EXR_FILE_RLE, EXR_FILE_NONE
 };
 
-/* The compression called auto, zip, zips, piz, rle or none; -1 when there is none such. */
-int file_exr_compression_by_name(const char *name);
+/* Their names, in this order, and NULL. */
+extern const char *const exr_file_compression_name[];
 
 struct exr_file_options {
 	enum exr_file_compression compression;
@@ -60,10 +61,10 @@ int file_exr_write(const char *path, const struct image *im, const struct exr_fi
 int file_exr_read(const char *path, struct image *im, struct exr_file_info *info,
                   struct err *e);
 
-/* 1 if `path` is a picture whose attribute EXR_FILE_KEY is `key`: then the file is
- * touched (mtime now). Pixels are not read, but for scanline files it is checked that the
- * last rows are there: its cost is independent of the number of pixels but for a table of
- * 8 bytes per 16 rows. */
-int file_exr_up_to_date(const char *path, const char *key);
+/* Whether `path` is a picture whose attribute EXR_FILE_KEY fits: then the file is touched
+ * (mtime now). Pixels are not read, but for scanline files it is checked that the last rows
+ * are there: its cost is independent of the number of pixels but for a table of 8 bytes per
+ * 16 rows. */
+enum key_fit file_exr_up_to_date(const char *path, const char *key, int any_version);
 
 #endif

@@ -382,17 +382,17 @@ int file_exr_read(const char *path, struct image *im, struct exr_file_info *info
 	return -1;
 }
 
-int file_exr_up_to_date(const char *path, const char *key)
+enum key_fit file_exr_up_to_date(const char *path, const char *key, int any_version)
 {
 	struct exr_file_info info = { 0 };
 	struct err ignored = { 0 };
 	struct stat st;
+	enum key_fit fit = KEY_DIFFERS;
 
 	if (strcmp(path, "-") == 0 || stat(path, &st) || !S_ISREG(st.st_mode))
-		return 0;
-	int bad = read_file(path, NULL, &info, &ignored);
-	const char *has = file_exr_info_get(&info, EXR_FILE_KEY);
-	int same = !bad && has && strcmp(has, key) == 0;
+		return KEY_DIFFERS;
+	if (read_file(path, NULL, &info, &ignored) == 0)
+		fit = key_fit(file_exr_info_get(&info, EXR_FILE_KEY), key, any_version);
 	file_exr_info_free(&info);
-	return same && utimensat(AT_FDCWD, path, NULL, 0) == 0;
+	return fit != KEY_DIFFERS && utimensat(AT_FDCWD, path, NULL, 0) ? KEY_DIFFERS : fit;
 }

@@ -27,25 +27,17 @@ struct output {
 	struct err *e;
 };
 
-static const struct {
-	const char *name;
-	exr_compression_t method;
-} compressions[] = {
-	[EXR_FILE_AUTO] = { "auto", EXR_COMPRESSION_ZIP },
-	[EXR_FILE_ZIP] = { "zip", EXR_COMPRESSION_ZIP },
-	[EXR_FILE_ZIPS] = { "zips", EXR_COMPRESSION_ZIPS },
-	[EXR_FILE_PIZ] = { "piz", EXR_COMPRESSION_PIZ },
-	[EXR_FILE_RLE] = { "rle", EXR_COMPRESSION_RLE },
-	[EXR_FILE_NONE] = { "none", EXR_COMPRESSION_NONE },
-};
+const char *const exr_file_compression_name[] = { "auto", "zip", "zips", "piz", "rle", "none",
+	NULL };
 
-int file_exr_compression_by_name(const char *name)
-{
-	for (size_t i = 0; i < sizeof compressions / sizeof *compressions; i++)
-		if (strcmp(compressions[i].name, name) == 0)
-			return (int)i;
-	return -1;
-}
+static const exr_compression_t compressions[] = {
+	[EXR_FILE_AUTO] = EXR_COMPRESSION_ZIP,
+	[EXR_FILE_ZIP] = EXR_COMPRESSION_ZIP,
+	[EXR_FILE_ZIPS] = EXR_COMPRESSION_ZIPS,
+	[EXR_FILE_PIZ] = EXR_COMPRESSION_PIZ,
+	[EXR_FILE_RLE] = EXR_COMPRESSION_RLE,
+	[EXR_FILE_NONE] = EXR_COMPRESSION_NONE,
+};
 
 static void on_error(exr_const_context_t c, exr_result_t code, const char *message)
 {
@@ -120,7 +112,7 @@ static int write_header(struct output *o, const struct exr_file_info *info)
 	if (check(o, exr_set_longname_support(o->context, 1)) ||
 	    check(o, exr_add_part(o->context, NULL, EXR_STORAGE_SCANLINE, NULL)) ||
 	    check(o, exr_initialize_required_attr_simple(o->context, 0, im->width, im->height,
-	                                                 compressions[o->compression].method)) ||
+	                                                 compressions[o->compression])) ||
 	    check(o, exr_set_zip_compression_level(o->context, 0, ZIP_LEVEL)))
 		return -1;
 	for (int c = 0; c < im->channels; c++) {

@@ -2,34 +2,9 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "lib/base/vec3.h"
-
-static int parse_extent(const char *text, char **end, int *n)
-{
-	if (*text < '0' || *text > '9')
-		return -1;
-	long v = strtol(text, end, 10);
-	if (v < 1 || v > CAMERA_SIZE_MAX)
-		return -1;
-	*n = (int)v;
-	return 0;
-}
-
-int picture_camera_parse_size(const char *text, int *width, int *height)
-{
-	char *end;
-	int w, h;
-
-	if (parse_extent(text, &end, &w) || *end != 'x' || parse_extent(end + 1, &end, &h) ||
-	    *end)
-		return -1;
-	*width = w;
-	*height = h;
-	return 0;
-}
 
 static int no_such_camera(const struct model *m, const char *name, struct err *e)
 {

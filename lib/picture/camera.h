@@ -25,10 +25,6 @@ struct view_frame {
 	double step_x, step_y;              /* the same units for one pixel */
 };
 
-/* Parses "WxH". 0, or -1 when text is anything else or a number is not in
- * [1, CAMERA_SIZE_MAX]. */
-int picture_camera_parse_size(const char *text, int *width, int *height);
-
 /* Index of the camera called `name` in m, or -1 and e, which lists those there are
  * (with a NULL name, asking for one of them). */
 int picture_camera_find(const struct model *m, const char *name, struct err *e);

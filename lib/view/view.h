@@ -76,9 +76,8 @@ void view_scene_free(struct view_scene *v);
  * more often than there are images for (lib/ray/light_visibility.h). */
 int view_misses(const struct view_scene *v);
 
-/* The mask of a comma-separated list of layers (diffuse, directional, emission, Z,
- * N, element, patch, all) into layers. 0, or -1 with an unknown name. */
-int view_parse_layers(const char *list, unsigned *layers);
+/* Names of the layers, in the order of their bits, then `all`, then NULL. */
+extern const char *const view_layer_name[];
 
 /* Renders into a new picture: channels R, G, B (one band: all the same; otherwise
  * bands 0, 1, 2, or the last there is), `band.0` and so on unless there are 1 or 3

@@ -1,29 +1,9 @@
 #include "lib/view/view_layers.h"
 
 #include <stdio.h>
-#include <string.h>
 
-int view_parse_layers(const char *list, unsigned *layers)
-{
-	static const char *const name[] = { "diffuse", "directional", "emission", "Z", "N",
-		"element", "patch", "error", "all" };
-	enum { NAMES = sizeof name / sizeof *name };
-	unsigned mask = 0;
-
-	for (const char *p = list;; p++) {
-		size_t n = strcspn(p, ","), i = 0;
-		while (i < NAMES && (strlen(name[i]) != n || strncmp(p, name[i], n) != 0))
-			i++;
-		if (i == NAMES)
-			return -1;
-		mask |= i == NAMES - 1 ? (unsigned)VIEW_ALL : 1u << i;
-		p += n;
-		if (!*p)
-			break;
-	}
-	*layers = mask;
-	return 0;
-}
+const char *const view_layer_name[] = { "diffuse", "directional", "emission", "Z", "N", "element",
+	"patch", "error", "all", NULL };
 
 /* Names of the channels in the order of struct view_planes. */
 struct names {

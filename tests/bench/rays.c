@@ -177,7 +177,7 @@ static int make_camera_rays(struct bench *b, size_t count, const char *name, con
 
 	if (c < 0)
 		return -1;
-	if (picture_camera_parse_size(size, &width, &height))
+	if (sscanf(size, "%dx%d", &width, &height) != 2)
 		return err_set(e, "%s: not a picture size; give WxH", size);
 	if (picture_camera_frame(&b->m.camera[c], width, height, &f, e))
 		return -1;

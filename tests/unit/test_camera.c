@@ -20,22 +20,6 @@ static void near_vector(const double a[3], double x, double y, double z)
 	assert_that(fabs(a[0] - x) + fabs(a[1] - y) + fabs(a[2] - z), <, 1e-12);
 }
 
-static void test_sizes(void **state)
-{
-	int w = 0, h = -1;
-	(void)state;
-
-	assert_int_equal(picture_camera_parse_size("320x200", &w, &h), 0);
-	assert_int_equal(w, 320);
-	assert_int_equal(h, 200);
-	static const char *const wrong[] = { "", "x", "64", "64x", "3x", "x3", "3x0", "0x3", "-3x4", "3x4x5",
-		"3 x4", "3x+4", "99999999999x1", "3x4 ", "1e2x3" };
-	for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-		given("size %s", wrong[i]);
-		assert_int_equal(picture_camera_parse_size(wrong[i], &w, &h), -1);
-	}
-}
-
 static void test_resolution(void **state)
 {
 	struct camera c = perspective(1, 2), o = { .orthographic = 1, .xmag = 3, .ymag = 1 };
@@ -145,8 +129,7 @@ static void test_names(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_sizes), cmocka_unit_test(test_resolution),
+	const struct CMUnitTest tests[] = { cmocka_unit_test(test_resolution),
 		cmocka_unit_test(test_perspective_rays), cmocka_unit_test(test_orthographic_rays),
 		cmocka_unit_test(test_look_at), cmocka_unit_test(test_names)
 	};

@@ -1,19 +1,47 @@
 /* Command lines, each run in a process of its own. */
 #include <fcntl.h>
+#include <getopt.h>
 #include <sys/wait.h>
 
 /* The front end of the programs is not in the library. */
 #include "tools/common/cli.c"
 #include "tests/unit/fixtures/check.h"
+#include "tools/common/options.c"
 
-enum { OPT_SHARE = 256 };
+struct demo {
+	const char *output, *name;
+	int number, extra, method, pixels[2];
+	uint64_t big;
+	unsigned layers;
+	double share, at[3];
+	uint32_t part[2];
+	struct mesh_size size;
+	struct option_list camera;
+	char *mix;
+};
 
-static const struct cli_option table[] = {
-	{ 'o', "output", "FILE", "write FILE" },
-	{ 'n', "number", "N", "how many" },
-	{ OPT_SHARE, "share", "X", "the share" },
-	{ 'x', "extra", NULL, "more of it" },
-	{ 0, NULL, NULL, NULL }
+#undef REQUEST
+#define REQUEST struct demo
+
+static const char *const methods[] = { "rays", "auto", NULL };
+static const char *const layers[] = { "Z", "N", "patch", "all", NULL };
+static const char *const none[] = { "none", NULL };
+
+static const struct option_spec table[] = {
+	{ 'o', "output", "FILE", "write FILE", TEXT(output), .role = OPTION_ASIDE },
+	{ 'n', "number", "N", "how many (default %s)", INTEGER(number, 1, 10), .preset = "4" },
+	{ 0, "share", "X", "the share", NUMBER(share, 0, INFINITY), .words = none },
+	{ 'x', "extra", NULL, "more of it, %s", FLAG(extra) },
+	{ 0, "big", "N", "seed", INTEGER(big, 0, INT64_MAX) },
+	{ 0, "method", "HOW", "rays or %s (default)", WORD(method, methods), .preset = "auto" },
+	{ 0, "layers", "LIST", "Z, N, patch", SET(layers, layers) },
+	{ 0, "part", "K/N", "shard", RATIO(part) },
+	{ 0, "pixels", "WxH", "size", PIXELS(pixels) },
+	{ 0, "at", "X,Y,Z", "place", VECTOR(at) },
+	{ 0, "size", "SIZE", "length", LENGTH(size), .preset = "5%" },
+	{ 0, "camera", "NAME", "view", LIST(camera), .role = OPTION_RECORDED },
+	{ 0, "mix", "LIST", "groups", JOINED(mix) },
+	{ 0 }
 };
 
 static struct cli demo(void)
@@ -74,29 +102,64 @@ static void run(int (*fn)(int argc, char **argv), const char *to, char **argv)
 static int parse(int argc, char **argv)
 {
 	struct cli c = demo();
-	int letter;
+	struct demo d = { 0 };
+	int operand = options_parse(&c, argc, argv, &d);
 
-	while ((letter = cli_next(&c, argc, argv)) != -1) {
-		if (letter == 'n')
-			printf("n=%ld ", cli_integer(&c, "--number", optarg, 1, 10));
-		else if (letter == OPT_SHARE)
-			printf("share=%g ", cli_number(&c, "--share", optarg, 0, INFINITY));
-		else if (letter == 'o')
-			printf("out=%s ", optarg);
-		else
-			printf("%c ", letter);
-	}
-	printf("operands=%d q=%d v=%d j=%d", argc - optind, c.quiet, c.verbose, c.threads);
+	printf("n=%d share=%g out=%s x=%d%d operands=%d q=%d v=%d j=%d", d.number, d.share,
+	       d.output ? d.output : "-", d.extra, options_given(&c, "extra"), argc - operand, c.quiet,
+	       c.verbose, c.threads);
 	return cli_finish(&c, 0);
 }
 
-static void accepts(const char *expected, char **argv)
+static int parse_others(int argc, char **argv)
 {
-	run(parse, NULL, argv);
+	struct cli c = demo();
+	struct demo d = { 0 };
+
+	options_parse(&c, argc, argv, &d);
+	printf("%s%d %llu %u %u/%u %dx%d %g,%g,%g %g%s", methods[d.method], options_given(&c, "method"),
+	       (unsigned long long)d.big, d.layers, d.part[0], d.part[1], d.pixels[0], d.pixels[1],
+	       d.at[0], d.at[1], d.at[2], d.size.value, d.size.relative ? "r" : "");
+	for (size_t i = 0; i < d.camera.n; i++)
+		printf(" %s", d.camera.item[i]);
+	printf(" %s", d.mix ? d.mix : "");
+	free(d.camera.item);
+	free(d.mix);
+	return cli_finish(&c, 0);
+}
+
+/* The digest, then the history. */
+static int tell(int argc, char **argv)
+{
+	struct cli c = demo();
+	struct demo d = { 0 };
+	struct err e = { 0 };
+	struct digest *digest = file_digest_new();
+	char hex[33];
+
+	options_parse(&c, argc, argv, &d);
+	options_digest(&c, &d, digest);
+	file_digest_end(digest, hex);
+	char *history = options_history(&c, NULL, &e);
+	printf("%s %s", hex, history);
+	free(history);
+	free(d.camera.item);
+	free(d.mix);
+	return cli_finish(&c, 0);
+}
+
+static void accepts_by(int (*fn)(int argc, char **argv), const char *expected, char **argv)
+{
+	run(fn, NULL, argv);
 	assert_true(WIFEXITED(child.status));
 	assert_int_equal(WEXITSTATUS(child.status), 0);
 	assert_string_equal(child.out, expected);
 	assert_string_equal(child.err, "");
+}
+
+static void accepts(const char *expected, char **argv)
+{
+	accepts_by(parse, expected, argv);
 }
 
 static void refuses(const char *expected, char **argv)
@@ -116,10 +179,83 @@ static void refuses(const char *expected, char **argv)
 static void test_options(void **state)
 {
 	(void)state;
-	accepts("out=a n=7 share=inf x operands=1 q=0 v=0 j=3",
+	accepts("n=7 share=inf out=a x=11 operands=1 q=0 v=0 j=3",
 	        ARGS("-oa", "in", "--number=7", "--share", "inf", "-xj3"));
-	accepts("operands=1 q=1 v=1 j=1", ARGS("-qv", "--threads", "1", "--", "-x"));
-	accepts("share=0.5 operands=0 q=0 v=0 j=2", ARGS("--sha", ".5", "-j2"));
+	accepts("n=4 share=0 out=- x=00 operands=1 q=1 v=1 j=1", ARGS("-qv", "--threads", "1", "--", "-x"));
+	accepts("n=4 share=0.5 out=- x=00 operands=0 q=0 v=0 j=2", ARGS("--sha", ".5", "-j2"));
+	accepts("n=4 share=nan out=- x=00 operands=0 q=0 v=0 j=2", ARGS("--share=none", "-j2"));
+}
+
+static void test_types(void **state)
+{
+	(void)state;
+	accepts_by(parse_others, "auto0 0 0 0/0 0x0 0,0,0 0.05r ", ARGS("in"));
+	accepts_by(parse_others, "rays1 9223372036854775807 5 2/4 64x48 1,-2,0.5 inf a,b c all x=1,y=2",
+	           ARGS("--method", "rays", "--big", "9223372036854775807", "--layers=patch,Z", "--part",
+	                "2/4", "--pixels=64x48", "--at=1,-2,.5", "--size=inf", "--camera", "a,b",
+	                "--mix=x=1", "--camera=c", "--mix", "y=2", "--camera", "all"));
+	accepts_by(parse_others, "auto1 0 7 1/1 65536x1 0,0,0 2 ",
+	           ARGS("--method=auto", "--layers", "all", "--part=1/1", "--pixels", "65536x1", "--size", "2"));
+}
+
+static void test_wrong_types(void **state)
+{
+	static char *const pixels[] = { "", "x", "64", "64x", "3x", "x3", "3x0", "0x3", "-3x4", "3x4x5",
+		"3 x4", "3x+4", "99999999999x1", "3x4 ", "1e2x3", "65537x1" };
+	static char *const sets[] = { "", "z", "Z,", ",Z", "Z,,N", "pat", "patch.R", "Z N" };
+	static char *const parts[] = { "", "1", "0/2", "3/2", "1/2/3", "1/1000001", "a/b" };
+	static char *const vectors[] = { "", "1,2", "1,2,3,4", "1,2,inf", "1,2,x", "nan,0,0" };
+	char text[128];
+
+	(void)state;
+	refuses("--method: 'ray' is not one of rays, auto", ARGS("--method", "ray"));
+	refuses("--size: '5%' is not a number", ARGS("--size", "5%%"));
+	refuses("--size: a size must be greater than 0", ARGS("--size", "0%"));
+	refuses("--size: -1 is not a number of at least 0", ARGS("--size", "-1"));
+	for (size_t i = 0; i < sizeof pixels / sizeof *pixels; i++) {
+		snprintf(text, sizeof text, "--pixels: '%s' is not a size such as 640x480", pixels[i]);
+		refuses(text, ARGS("--pixels", pixels[i]));
+	}
+	for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
+		snprintf(text, sizeof text, "--layers: '%s' is not a list of Z, N, patch, all", sets[i]);
+		refuses(text, ARGS("--layers", sets[i]));
+	}
+	for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+		snprintf(text, sizeof text, "--part: '%s' is not K/N with 1 <= K <= N, such as 2/4",
+		         parts[i]);
+		refuses(text, ARGS("--part", parts[i]));
+	}
+	for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++) {
+		snprintf(text, sizeof text, "--at: '%s' is not three numbers X,Y,Z", vectors[i]);
+		refuses(text, ARGS("--at", vectors[i]));
+	}
+}
+
+/* What tell says, the digest's 32 digits apart. */
+static const char *told(char digest[33], char **argv)
+{
+	run(tell, NULL, argv);
+	assert_int_equal(WEXITSTATUS(child.status), 0);
+	snprintf(digest, 33, "%.32s", child.out);
+	return child.out + 33;
+}
+
+/* All options but those that say where, how fast and which inputs, are in the key. */
+static void test_key_and_history(void **state)
+{
+	static char *const other[] = { "-n5", "--share=1", "-x", "--big=1", "--method=rays", "--layers=Z",
+		"--part=1/2", "--pixels=1x1", "--at=1,2,3", "--size=.05", "--mix=a=1" };
+	char plain[33], same[33], digest[33];
+
+	(void)state;
+	assert_string_equal(told(plain, ARGS("in")), "demo in");
+	assert_string_equal(told(same, ARGS("-q", "-o", "a", "in", "-n4", "--camera=b", "--thr=3", "-vj2", "-ob")),
+	                    "demo -n4 --camera=b in");
+	assert_string_equal(same, plain);
+	for (size_t i = 0; i < sizeof other / sizeof *other; i++) {
+		told(digest, ARGS(other[i], "in"));
+		assert_string_not_equal(digest, plain);
+	}
 }
 
 static void test_wrong_usage(void **state)
@@ -146,19 +282,22 @@ static void test_wrong_usage(void **state)
 
 static int bounded(int argc, char **argv)
 {
-	struct cli c = demo();
+	static const struct option_spec one[] = { { 0, "share", "X", "the share", NUMBER(share, -1, 1) },
+		                                  { 0 } };
+	struct cli c = { .program = "demo", .options = one };
+	struct demo d = { 0 };
 
-	(void)argc;
-	printf("%g", cli_number(&c, "--share", argv[1], -1, 1));
+	options_parse(&c, argc, argv, &d);
+	printf("%g", d.share);
 	return cli_finish(&c, 0);
 }
 
 static void test_numbers(void **state)
 {
 	(void)state;
-	run(bounded, NULL, ARGS("-1e-320"));
+	run(bounded, NULL, ARGS("--share=-1e-320"));
 	assert_int_equal(WEXITSTATUS(child.status), 0);
-	run(bounded, NULL, ARGS("inf"));
+	run(bounded, NULL, ARGS("--share=inf"));
 	assert_int_equal(WEXITSTATUS(child.status), 2);
 	assert_non_null(strstr(child.err, "--share: inf is not in the range from -1 to 1"));
 }
@@ -174,9 +313,18 @@ static void test_help(void **state)
 	    "Shows.\n"
 	    "\n"
 	    "  -o, --output FILE  write FILE\n"
-	    "  -n, --number N     how many\n"
+	    "  -n, --number N     how many (default 4)\n"
 	    "      --share X      the share\n"
-	    "  -x, --extra        more of it\n"
+	    "  -x, --extra        more of it, %s\n"
+	    "      --big N        seed\n"
+	    "      --method HOW   rays or auto (default)\n"
+	    "      --layers LIST  Z, N, patch\n"
+	    "      --part K/N     shard\n"
+	    "      --pixels WxH   size\n"
+	    "      --at X,Y,Z     place\n"
+	    "      --size SIZE    length\n"
+	    "      --camera NAME  view\n"
+	    "      --mix LIST     groups\n"
 	    "  -j, --threads N    threads to use (default: one for each processor)\n"
 	    "  -q, --quiet        print errors and warnings only\n"
 	    "  -v, --verbose      print more about what is done\n"
@@ -199,10 +347,10 @@ static void test_full_output(void **state)
 static int messages(int argc, char **argv)
 {
 	struct cli c = demo();
+	struct demo d = { 0 };
 	struct err e = { 0 };
 
-	while (cli_next(&c, argc, argv) != -1)
-		;
+	options_parse(&c, argc, argv, &d);
 	cli_warn(&c, "warn %d", 1);
 	cli_note(&c, "note");
 	cli_detail(&c, "detail");
@@ -224,11 +372,11 @@ static void test_messages(void **state)
 static int progress(int argc, char **argv)
 {
 	struct cli c = demo();
+	struct demo d = { 0 };
 	struct cli_progress p;
 	struct progress report;
 
-	while (cli_next(&c, argc, argv) != -1)
-		;
+	options_parse(&c, argc, argv, &d);
 	report = cli_progress_begin(&p, &c, "rows");
 	if (!report.fn)
 		return 5;
@@ -313,6 +461,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_options),     cmocka_unit_test(test_wrong_usage),
+		cmocka_unit_test(test_types),       cmocka_unit_test(test_wrong_types),
+		cmocka_unit_test(test_key_and_history),
 		cmocka_unit_test(test_numbers),     cmocka_unit_test(test_help),
 		cmocka_unit_test(test_full_output), cmocka_unit_test(test_messages),
 		cmocka_unit_test(test_progress),    cmocka_unit_test(test_signals),

@@ -553,28 +553,46 @@ static void test_digest_is_loose_about_cameras(void **state)
 	assert_string_not_equal(a, b);
 }
 
+#define MADE_OF "0123456789abcdef0123456789abcdef:"
+#define KEY MADE_OF "00000000000000000000000000000001"
+
 static void test_up_to_date(void **state)
 {
+	static const char format[] = "twopass.mesh";
+	static const char other_code[] = MADE_OF "00000000000000000000000000000002";
+	static const char other[] = "1" KEY;
 	struct timespec old[2] = { { .tv_sec = 1000 }, { .tv_sec = 1000 } };
 	struct stat st;
 
 	(void)state;
-	write_sample(path, "k1");
+	write_sample(path, KEY);
 	utimensat(AT_FDCWD, path, old, 0);
-	assert_int_equal(file_cache_up_to_date(path, "twopass.mesh", "k2"), 0);
-	assert_int_equal(file_cache_up_to_date(path, "twopass.ff", "k1"), 0);
-	assert_int_equal(file_cache_up_to_date("/nowhere", "twopass.mesh", "k1"), 0);
+	assert_int_equal(file_cache_up_to_date(path, format, other, 0), KEY_DIFFERS);
+	assert_int_equal(file_cache_up_to_date(path, format, other, 1), KEY_DIFFERS);
+	assert_int_equal(file_cache_up_to_date(path, format, "", 1), KEY_DIFFERS);
+	assert_int_equal(file_cache_up_to_date(path, format, other_code, 0), KEY_DIFFERS);
+	assert_int_equal(file_cache_up_to_date(path, "twopass.ff", KEY, 1), KEY_DIFFERS);
+	assert_int_equal(file_cache_up_to_date("/nowhere", format, KEY, 1), KEY_DIFFERS);
 	assert_int_equal(stat(path, &st), 0);
 	assert_int_equal(st.st_mtime, 1000);
-	assert_int_equal(file_cache_up_to_date(path, "twopass.mesh", "k1"), 1);
+	assert_int_equal(file_cache_up_to_date(path, format, other_code, 1), KEY_OTHER_VERSION);
+	assert_int_equal(stat(path, &st), 0);
+	assert_true(st.st_mtime > 1000);
+	utimensat(AT_FDCWD, path, old, 0);
+	assert_int_equal(file_cache_up_to_date(path, format, KEY, 0), KEY_FITS);
+	assert_int_equal(file_cache_up_to_date(path, format, KEY, 1), KEY_FITS);
 	assert_int_equal(stat(path, &st), 0);
 	assert_that(st.st_mtime, >, 1000);
 	assert_int_equal(truncate(path, st.st_size - 1), 0);
-	assert_int_equal(file_cache_up_to_date(path, "twopass.mesh", "k1"), 0);
+	assert_int_equal(file_cache_up_to_date(path, format, KEY, 0), KEY_DIFFERS);
 }
 
 static void test_history(void **state)
 {
+	static const struct history_option aside[] = {
+		{ 'q', "quiet", 0 }, { 'v', "verbose", 0 }, { 'j', "threads", 1 }, { 'o', "output", 1 },
+		{ 0, "any-version", 0 }, { 0, NULL, 0 }
+	};
 	static const struct {
 		const char *before;
 		char *argv[12];
@@ -587,6 +605,7 @@ static void test_history(void **state)
 		  "r.mesh" }, "a\nffcalc --part 1/4 r.mesh" },
 		{ "", { "trace", "--log=/tmp/a b", "it's", "", "-qvn", "3", "--thr", "2", "-" },
 		  "trace --log='a b' 'it'\\''s' '' -n 3 -" },
+		{ NULL, { "trace", "--any", "--o", "f", "-c", "o", "-qof", "-x", "--output=f" }, "trace -c o -x" },
 		{ NULL, { "shoot", "x/y\n/", "\xff", "--", "-q" }, "shoot $'y\\012' $'\\377' -- -q" },
 	};
 
@@ -597,7 +616,7 @@ static void test_history(void **state)
 		int argc = 0;
 		while (cases[i].argv[argc])
 			argc++;
-		char *h = file_history_append(cases[i].before, argc, cases[i].argv, &e);
+		char *h = file_history_append(cases[i].before, argc, cases[i].argv, aside, &e);
 		assert_string_equal(h, cases[i].after);
 		free(h);
 	}

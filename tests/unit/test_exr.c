@@ -163,10 +163,10 @@ static void test_auto(void **state)
 static void test_names(void **state)
 {
 	(void)state;
-	assert_int_equal(file_exr_compression_by_name("auto"), EXR_FILE_AUTO);
-	assert_int_equal(file_exr_compression_by_name("zip"), EXR_FILE_ZIP);
-	assert_int_equal(file_exr_compression_by_name("none"), EXR_FILE_NONE);
-	assert_int_equal(file_exr_compression_by_name("dwaa"), -1);
+	assert_string_equal(exr_file_compression_name[EXR_FILE_AUTO], "auto");
+	assert_string_equal(exr_file_compression_name[EXR_FILE_ZIP], "zip");
+	assert_string_equal(exr_file_compression_name[EXR_FILE_NONE], "none");
+	assert_null(exr_file_compression_name[EXR_FILE_NONE + 1]);
 }
 
 static void test_attributes(void **state)

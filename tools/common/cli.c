@@ -2,7 +2,6 @@
 
 #include <ctype.h>
 #include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -17,24 +16,7 @@
 #include "formats/container/atomic_file.h"
 #include "lib/base/mem.h"
 
-/* Letters of the common options that have no short form: beyond any table's. */
-enum { LETTER_HELP = 100000, LETTER_VERSION };
-enum { OPTIONS_MAX = 128 };
-
 static volatile sig_atomic_t bar_on_screen;
-
-static const struct cli_option common_options[] = {
-	{ 'q', "quiet", NULL, "print errors and warnings only" },
-	{ 'v', "verbose", NULL, "print more about what is done" },
-	{ LETTER_HELP, "help", NULL, "print this help and exit" },
-	{ LETTER_VERSION, "version", NULL, "print the version and exit" },
-	{ 0, NULL, NULL, NULL }
-};
-
-static const struct cli_option threads_option[] = {
-	{ 'j', "threads", "N", "threads to use (default: one for each processor)" },
-	{ 0, NULL, NULL, NULL }
-};
 
 /* ---- messages ---- */
 
@@ -120,176 +102,6 @@ int cli_finish(const struct cli *c, int status)
 		return status;
 	cli_warn(c, "standard output: %s", errno ? strerror(errno) : "write error");
 	return status ? status : 1;
-}
-
-/* ---- the option table ---- */
-
-static int label(const struct cli_option *o, char *text, size_t size)
-{
-	char letter[8] = "    ";
-
-	if (o->letter < 256)
-		snprintf(letter, sizeof letter, "-%c, ", o->letter);
-	return snprintf(text, size, "  %s--%s%s%s", letter, o->name, o->argument ? " " : "",
-	                o->argument ? o->argument : "");
-}
-
-static int widest(const struct cli_option *o)
-{
-	char text[256];
-	int width = 0;
-
-	for (; o->letter; o++) {
-		int n = label(o, text, sizeof text);
-		width = n > width ? n : width;
-	}
-	return width;
-}
-
-static void print_options(const struct cli_option *o, int width)
-{
-	char text[256];
-
-	for (; o->letter; o++) {
-		label(o, text, sizeof text);
-		printf("%-*s  %s\n", width, text, o->help);
-	}
-}
-
-static void print_help(const struct cli *c)
-{
-	int width = widest(c->options), common = widest(common_options);
-
-	width = common > width ? common : width;
-	printf("Usage: %s %s\n%s\n\n", c->program, c->synopsis, c->about);
-	print_options(c->options, width);
-	if (c->uses_threads)
-		print_options(threads_option, width);
-	print_options(common_options, width);
-}
-
-/* What getopt_long wants, made from the tables. */
-struct getopt_tables {
-	char letters[3 + 2 * OPTIONS_MAX];
-	struct option longs[OPTIONS_MAX + 1];
-	int n;
-};
-
-static void add_options(struct getopt_tables *t, const struct cli_option *o)
-{
-	char *s = t->letters + strlen(t->letters);
-
-	for (; o->letter && t->n < OPTIONS_MAX; o++) {
-		t->longs[t->n++] = (struct option){
-			.name = o->name, .val = o->letter,
-			.has_arg = o->argument ? required_argument : no_argument };
-		if (o->letter >= 256)
-			continue;
-		*s++ = (char)o->letter;
-		if (o->argument)
-			*s++ = ':';
-	}
-	*s = 0;
-}
-
-static const struct option *find_letter(const struct getopt_tables *t, int letter)
-{
-	for (int i = 0; i < t->n; i++)
-		if (t->longs[i].val == letter)
-			return &t->longs[i];
-	return NULL;
-}
-
-static void __attribute__((noreturn)) wrong_option(const struct cli *c,
-                                                   const struct getopt_tables *t, int code,
-                                                   char **argv)
-{
-	const struct option *known = find_letter(t, optopt);
-
-	if (code == ':' && known)
-		cli_usage(c, "option --%s needs an argument", known->name);
-	if (known)
-		cli_usage(c, "option --%s takes no argument", known->name);
-	if (optopt)
-		cli_usage(c, "unknown option -%c", optopt);
-	cli_usage(c, "unknown or ambiguous option %s", argv[optind - 1]);
-}
-
-int cli_next(struct cli *c, int argc, char **argv)
-{
-	struct getopt_tables t = { .letters = ":" };
-
-	add_options(&t, c->options);
-	if (c->uses_threads)
-		add_options(&t, threads_option);
-	add_options(&t, common_options);
-	if (c->threads == 0)
-		c->threads = par_cpus();
-	opterr = 0;
-	for (;;) {
-		int letter = getopt_long(argc, argv, t.letters, t.longs, NULL);
-
-		if (letter == 'q') {
-			c->quiet = 1;
-		} else if (letter == 'v') {
-			c->verbose = 1;
-		} else if (letter == 'j' && c->uses_threads) {
-			c->threads = (int)cli_integer(c, "--threads", optarg, 1, 256);
-		} else if (letter == LETTER_HELP) {
-			print_help(c);
-			exit(cli_finish(c, 0));
-		} else if (letter == LETTER_VERSION) {
-			printf("%s (twopass) %s\n", c->program, TWOPASS_VERSION);
-			exit(cli_finish(c, 0));
-		} else if (letter == '?' || letter == ':') {
-			wrong_option(c, &t, letter, argv);
-		} else {
-			return letter;
-		}
-	}
-}
-
-/* ---- numbers ---- */
-
-static void __attribute__((noreturn)) out_of_range(const struct cli *c, const char *option,
-                                                   const char *text, double min, double max)
-{
-	if (min > -INFINITY && max < INFINITY)
-		cli_usage(c, "%s: %s is not in the range from %g to %g", option, text, min, max);
-	if (min > -INFINITY)
-		cli_usage(c, "%s: %s is not a number of at least %g", option, text, min);
-	cli_usage(c, "%s: %s is not a number of at most %g", option, text, max);
-}
-
-double cli_number(const struct cli *c, const char *option, const char *text, double min,
-                  double max)
-{
-	char *end;
-	double v;
-
-	errno = 0;
-	v = strtod(text, &end);
-	if (end == text || *end || isspace((unsigned char)*text) || isnan(v))
-		cli_usage(c, "%s: '%s' is not a number", option, text);
-	/* 1e999 is a typing error, not infinity. */
-	if ((errno == ERANGE && isinf(v)) || v < min || v > max)
-		out_of_range(c, option, text, min, max);
-	return v;
-}
-
-long cli_integer(const struct cli *c, const char *option, const char *text, long min,
-                 long max)
-{
-	char *end;
-	long v;
-
-	errno = 0;
-	v = strtol(text, &end, 10);
-	if (end == text || *end || isspace((unsigned char)*text))
-		cli_usage(c, "%s: '%s' is not a whole number", option, text);
-	if (errno == ERANGE || v < min || v > max)
-		cli_usage(c, "%s: %s is not in the range from %ld to %ld", option, text, min, max);
-	return v;
 }
 
 /* ---- progress ---- */

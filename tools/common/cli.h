@@ -1,33 +1,28 @@
-/* Command lines: options from one table, messages, progress. */
+/* What all programs say and how: messages, progress, signals. */
 #ifndef TWOPASS_CLI_H
 #define TWOPASS_CLI_H
 
+#include <stdint.h>
+
 #include "lib/base/err.h"
 #include "lib/base/parallel.h"
+#include "tools/common/options.h"
 
-/* An option; the last entry has letter 0. Options without a short form use
- * letters >= 256. --help prints the table; --help, --version, -q, -v and (where
- * `threads` is set) -j are handled by cli_next. */
-struct cli_option {
-	int letter;
-	const char *name;      /* long name */
-	const char *argument;  /* its name in --help, or NULL */
-	const char *help;      /* one line */
-};
 
 struct cli {
 	const char *program;
 	const char *synopsis;  /* after the program's name */
 	const char *about;     /* one sentence */
-	const struct cli_option *options;
-	int uses_threads;
-	/* results */
-	int quiet, verbose, threads;
+	const struct option_spec *options;
+	int uses_threads;      /* has -j */
+	int keeps_output;      /* has --any-version: leaves alone what is up to date */
+	/* what options_parse found */
+	int quiet, verbose, help, version, any_version;
+	int threads;           /* all processors unless -j says otherwise */
+	uint64_t given;        /* bit i: options[i] was there */
+	int argc;
+	char **argv;
 };
-
-/* The next option's letter (argument in optarg), or -1 at the end (operands from
- * optind). Prints help or version and exits 0; wrong usage exits 2. */
-int cli_next(struct cli *c, int argc, char **argv);
 
 /* Wrong usage: "prog: <text>" and a pointer to --help on stderr, exit 2. */
 void cli_usage(const struct cli *c, const char *format, ...)
@@ -49,12 +44,6 @@ int cli_fail(const struct cli *c, const struct err *e);
 
 /* Flushes and closes stdout; `status`, or 1 with a message if that failed. */
 int cli_finish(const struct cli *c, int status);
-
-/* Numbers: exits 2 with the option's name when text is not a number in range. */
-double cli_number(const struct cli *c, const char *option, const char *text, double min,
-                  double max);
-long cli_integer(const struct cli *c, const char *option, const char *text, long min,
-                 long max);
 
 /* Progress of one stage: a bar with rate and time left on a terminal (after one
  * second), a line every 10 s with -v otherwise, nothing with -q. */
