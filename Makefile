@@ -62,7 +62,7 @@ $(PROGRAMS): $(BUILD)/%: $(BUILD)/tools/%.o $(BUILD)/libcli.a $(BUILD)/libcommon
 $(KEYED:%=$(BUILD)/%): $(BUILD)/%: $(BUILD)/code/%.o
 $(BUILD)/code/%.c: $(BUILD)/tools/%.o $(BUILD)/libcli.a $(BUILD)/libcommon.a tools/code_digest.pl
 	@mkdir -p $(@D)
-	@$(CC) $(LDFLAGS) -no-pie -Wl,-t,-t,--unresolved-symbols=ignore-all -o $(@:.c=.link) \
+	@$(CC) $(LDFLAGS) -no-pie -s -Wl,-t,-t,--unresolved-symbols=ignore-all -o $(@:.c=.link) \
 		$(filter-out %.pl,$^) $(LDLIBS) | perl tools/code_digest.pl $(BUILD) $* >$@.new
 	@rm $(@:.c=.link); mv $@.new $@
 
