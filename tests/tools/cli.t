@@ -1,19 +1,8 @@
 #!/bin/sh
-# What all programs have in common: --help, --version, wrong usage, and man pages
-# that name the options the programs have.
+# What all programs have in common: --help, --version, wrong usage.
 . "$(dirname "$0")/tap.sh"
 
 tools="mesh ffcalc shoot trace reference inspect exrcmp tone"
-
-# Long options in a program's --help.
-help_options() {
-	"$1" --help | grep -o -e '--[a-z][a-z0-9-]*' | sort -u
-}
-
-# Long options a man page lists as items: mdoc writes --name as -name.
-page_options() {
-	grep '^\.It Fl' "$top/man/$1.1" | grep -o -e ' -[a-z][a-z0-9-]*' | sed 's/^ /-/' | sort -u
-}
 
 for tool in $tools; do
 	$tool --help >"$T/help" 2>"$T/err"
@@ -28,14 +17,6 @@ for tool in $tools; do
 	refuses 2 "^$tool: .*no-such-option" "$tool --no-such-option: exit 2" \
 		$tool --no-such-option
 	refuses 2 "^$tool: " "$tool without operands: exit 2" $tool
-	if [ -f "$top/man/$tool.1" ]; then
-		help_options $tool >"$T/in-help"
-		page_options $tool >"$T/in-page"
-		check "$tool: the options of --help are those of the man page" \
-			diff "$T/in-help" "$T/in-page"
-	else
-		result 1 "$tool: has a man page"
-	fi
 	check "$tool --help: a full disk is noticed" sh -c "! $tool --help >/dev/full 2>/dev/null"
 done
 

@@ -114,7 +114,8 @@ static void test_glb_is_the_same(void **state)
 		fail_msg("%s", b.e.text);
 	assert_int_equal(a.m.vertices, b.m.vertices);
 	assert_memory_equal(a.m.vertex, b.m.vertex, 24 * a.m.vertices);
-	assert_memory_equal(a.m.triangle.corner, b.m.triangle.corner, 12 * a.m.triangle.n);
+	assert_memory_equal(a.m.triangle.corner, b.m.triangle.corner,
+	                    12 * a.m.triangle.n);
 	end(&a);
 	end(&b);
 }
