@@ -1,5 +1,5 @@
 #!/usr/bin/perl
-# Writes program_code.c for tools/common/key.c: the digest of the sources of a program.
+# Prints program_code, the digest of the sources of a program, as tools/common/key.c wants it.
 # usage: code_digest.pl BUILD PROGRAM, with what the linker traces (-t -t) on stdin.
 #
 # These are the program's own file, what it takes of the library, and all that these include;

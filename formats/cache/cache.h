@@ -15,7 +15,7 @@ struct cache_info {
 	char *history;         /* commands, one per line */
 	char *options;         /* the tool's options as a JSON object */
 	char *report;          /* what was modelled, counts, errors, as JSON */
-	char *key;             /* container/key.h: equal keys, equal output */
+	char *key;             /* formats/container/key.h: equal keys, equal output */
 	char geometry_id[33];  /* all that form factors depend on */
 	char material_id[33];  /* coefficients, emission, intensities of lights */
 	char camera_id[33];    /* all cameras */

@@ -24,7 +24,7 @@ struct exr_file_info {
 /* Names of string attributes with a fixed meaning. */
 #define EXR_FILE_CAMERA "camera"   /* name of the camera */
 #define EXR_FILE_HISTORY "history" /* commands, one per line */
-#define EXR_FILE_KEY "twopassKey"  /* container/key.h */
+#define EXR_FILE_KEY "twopassKey"  /* formats/container/key.h */
 
 /* Adds or replaces a string. 0, or -1 and e. O(strings). */
 int file_exr_info_set(struct exr_file_info *i, const char *name, const char *value,

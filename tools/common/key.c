@@ -2,7 +2,7 @@
 
 #include <stdio.h>
 
-/* Made by the build: see code_digest.pl. */
+/* Made by the build, by tools/code_digest.pl. */
 extern const char program_code[33];
 
 struct digest *key_begin(const struct cli *c, const void *request)
