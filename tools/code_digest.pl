@@ -44,8 +44,10 @@ add_sources("$build/tools/$program.d");
 my $members = 0;
 while (<STDIN>) {
 	next unless /libcommon\.a[()]+(\w+)\.o/;
-	my @rules = glob "$build/{lib,formats}/*/$1.d";
-	die "$1.o: made by @{[scalar @rules]} rules\n" if @rules != 1;
+	# A file that was moved leaves its old rule behind.
+	my @sources = (glob("lib/*/$1.c"), glob("formats/*/$1.c"), glob("formats/*/$1.cc"));
+	my @rules = map { "$build/" . s/\.cc?$/.d/r } @sources;
+	die "$1.o: made of @{[scalar @rules]} files\n" if @rules != 1;
 	add_sources($rules[0]);
 	$members++;
 }

@@ -54,7 +54,7 @@ static const struct option_spec option_table[] = {
 	{ 0, "seed", "N", "start of the random numbers (default: %s)",
 	  INTEGER(o.seed, 0, INT64_MAX), .preset = "1" },
 	{ 0, "compression", "METHOD", "%s (default), zip, zips, piz, rle or none",
-	  WORD(exr.compression, exr_file_compression_name), .preset = "auto" },
+	  WORD(exr.compression, file_exr_compression_name), .preset = "auto" },
 	{ 0 }
 };
 

@@ -102,7 +102,7 @@ static const struct option_spec option_table[] = {
 	  SET(view.layers, view_layer_name) },
 	{ 0, "half", NULL, "colours as 16-bit floats", FLAG(exr.half) },
 	{ 0, "compression", "METHOD", "%s (default), zip, zips, piz, rle or none",
-	  WORD(exr.compression, exr_file_compression_name), .preset = "auto" },
+	  WORD(exr.compression, file_exr_compression_name), .preset = "auto" },
 	{ 0, "mix", "NAME=X,...", "scale the light of groups by X, or X:X:X for each band",
 	  JOINED(mix) },
 	{ 0 }

@@ -16,38 +16,6 @@ const char *twopass_version(void)
 	return TWOPASS_VERSION;
 }
 
-/* ---- for all files of this folder ---- */
-
-int api_status(const struct err *e, struct twopass_error *error)
-{
-	if (error)
-		snprintf(error->text, sizeof error->text, "%s", e->set ? e->text : "");
-	return e->set ? -1 : 0;
-}
-
-int api_within(const char *what, double x, double least, double most, struct err *e)
-{
-	return x >= least && x <= most ? 0 : err_set(e, "%s is %g, not between %g and %g", what, x,
-	                                             least, most);
-}
-
-int api_threads(int threads)
-{
-	return threads > 0 ? threads : par_cpus();
-}
-
-int api_history(struct cache_info *i, const char *before, const char *call,
-                const char *operand, struct err *e)
-{
-	/* Nobody writes to them, though their type would allow it. */
-	char *argv[] = { (char *)(uintptr_t)call, (char *)(uintptr_t)operand };
-	char *history = file_history_append(before, operand ? 2 : 1, argv, e);
-
-	file_cache_info_free(i);
-	i->history = history;
-	return history ? 0 : -1;
-}
-
 /* ---- making and freeing ---- */
 
 /* Lists the sides of n things that are modelled. */

@@ -302,7 +302,7 @@ enum key_fit file_cache_up_to_date(const char *path, const char *format, const c
 		return KEY_DIFFERS;
 	const char *version = file_container_get_meta(c, "version");
 	if (version && strcmp(version, version_of(format)) == 0)
-		fit = key_fit(file_container_get_meta(c, "key"), key, any_version);
+		fit = file_key_fit(file_container_get_meta(c, "key"), key, any_version);
 	file_container_close(c);
 	/* make(1) must see it newer than what it was made from. */
 	return fit && utimensat(AT_FDCWD, path, NULL, 0) ? KEY_DIFFERS : fit;

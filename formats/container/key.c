@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-enum key_fit key_fit(const char *have, const char *want, int any_version)
+enum key_fit file_key_fit(const char *have, const char *want, int any_version)
 {
 	size_t made_of = strcspn(want, ":");
 

@@ -9,6 +9,6 @@ enum key_fit { KEY_DIFFERS, KEY_FITS, KEY_OTHER_VERSION };
 
 /* Whether an output with the key `have` (NULL: it has none) is one with the key `want`, or was
  * made of the same by other sources, where any_version allows that. */
-enum key_fit key_fit(const char *have, const char *want, int any_version);
+enum key_fit file_key_fit(const char *have, const char *want, int any_version);
 
 #endif

@@ -40,7 +40,7 @@ enum exr_file_compression {
 };
 
 /* Their names, in this order, and NULL. */
-extern const char *const exr_file_compression_name[];
+extern const char *const file_exr_compression_name[];
 
 struct exr_file_options {
 	enum exr_file_compression compression;

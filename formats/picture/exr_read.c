@@ -392,7 +392,7 @@ enum key_fit file_exr_up_to_date(const char *path, const char *key, int any_vers
 	if (strcmp(path, "-") == 0 || stat(path, &st) || !S_ISREG(st.st_mode))
 		return KEY_DIFFERS;
 	if (read_file(path, NULL, &info, &ignored) == 0)
-		fit = key_fit(file_exr_info_get(&info, EXR_FILE_KEY), key, any_version);
+		fit = file_key_fit(file_exr_info_get(&info, EXR_FILE_KEY), key, any_version);
 	file_exr_info_free(&info);
 	return fit != KEY_DIFFERS && utimensat(AT_FDCWD, path, NULL, 0) ? KEY_DIFFERS : fit;
 }

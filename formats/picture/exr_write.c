@@ -27,7 +27,7 @@ struct output {
 	struct err *e;
 };
 
-const char *const exr_file_compression_name[] = { "auto", "zip", "zips", "piz", "rle", "none",
+const char *const file_exr_compression_name[] = { "auto", "zip", "zips", "piz", "rle", "none",
 	NULL };
 
 static const exr_compression_t compressions[] = {

@@ -42,7 +42,7 @@ static void measure_elements(struct division *d)
 	}
 }
 
-int division_init(struct division *d, const struct model *m, double size, double cos_cone,
+int mesh_division_init(struct division *d, const struct model *m, double size, double cos_cone,
                   size_t *regions, struct err *e)
 {
 	*d = (struct division){ .m = m, .size = size, .cos_cone = cos_cone };
@@ -57,7 +57,7 @@ int division_init(struct division *d, const struct model *m, double size, double
 	return 0;
 }
 
-void division_free(struct division *d)
+void mesh_division_free(struct division *d)
 {
 	geo_half_edges_free(&d->g);
 	free(d->region);

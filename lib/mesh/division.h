@@ -25,9 +25,9 @@ struct division {
 /* Finds the regions of a model, *regions of them, and measures its elements. size: of a patch, m;
  * cos_cone: of the angle that normals of a patch may be off its mean. O(elements log elements).
  * 0, or -1 and e; to be freed in any case. */
-int division_init(struct division *d, const struct model *m, double size, double cos_cone,
+int mesh_division_init(struct division *d, const struct model *m, double size, double cos_cone,
                   size_t *regions, struct err *e);
-void division_free(struct division *d);
+void mesh_division_free(struct division *d);
 
 /* Range of an element along an axis. */
 void mesh_division_extent(const struct division *d, uint32_t element, const double axis[3],

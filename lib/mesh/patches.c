@@ -315,7 +315,7 @@ static int divider_init(struct divider *d, const struct model *m, double size, d
                         size_t *regions, struct err *e)
 {
 	*d = (struct divider){ .e = e };
-	if (division_init(&d->d, m, size, cos_cone, regions, e))
+	if (mesh_division_init(&d->d, m, size, cos_cone, regions, e))
 		return -1;
 	d->order = mem_new(m->element.n, sizeof *d->order, "patches", e);
 	d->queue = mem_new(m->element.n, sizeof *d->queue, "patches", e);
@@ -326,7 +326,7 @@ static int divider_init(struct divider *d, const struct model *m, double size, d
 
 static void divider_free(struct divider *d)
 {
-	division_free(&d->d);
+	mesh_division_free(&d->d);
 	free(d->order);
 	free(d->queue);
 	free(d->label);

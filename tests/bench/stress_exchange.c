@@ -9,8 +9,8 @@
 #include <stdio.h>
 #include <time.h>
 
-#include "../unit/brute.h"
-#include "../unit/random_scene.h"
+#include "tests/unit/fixtures/brute.h"
+#include "tests/unit/fixtures/random_scene.h"
 #include "lib/occlusion/exchange.h"
 
 static double seconds(void)
