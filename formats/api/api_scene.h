@@ -35,59 +35,22 @@ static inline int api_status(const struct err *e, struct twopass_error *error)
 }
 
 /* 0, or -1 and e if x is not in [least, most], NaN included. */
-static inline int api_status(const struct err *e, struct twopass_error *error)
-{
-	if (error)
-		snprintf(error->text, sizeof error->text, "%s", e->set ? e->text : "");
-	return e->set ? -1 : 0;
-}
-
-int api_within(const char *what, double x, double least, double most, struct err *e)
+static inline int api_within(const char *what, double x, double least, double most,
+                             struct err *e)
 {
 	return x >= least && x <= most ? 0 : err_set(e, "%s is %g, not between %g and %g", what, x,
 	                                             least, most);
 }
 
 /* How many threads that makes. */
-static inline int api_status(const struct err *e, struct twopass_error *error)
-{
-	if (error)
-		snprintf(error->text, sizeof error->text, "%s", e->set ? e->text : "");
-	return e->set ? -1 : 0;
-}
-
-int api_within(const char *what, double x, double least, double most, struct err *e)
-{
-	return x >= least && x <= most ? 0 : err_set(e, "%s is %g, not between %g and %g", what, x,
-	                                             least, most);
-}
-
-int api_threads(int threads)
+static inline int api_threads(int threads)
 {
 	return threads > 0 ? threads : par_cpus();
 }
 
 /* The history of i becomes `before` and a line for this call, its other texts nothing.
  * operand may be NULL. 0, or -1 and e. */
-static inline int api_status(const struct err *e, struct twopass_error *error)
-{
-	if (error)
-		snprintf(error->text, sizeof error->text, "%s", e->set ? e->text : "");
-	return e->set ? -1 : 0;
-}
-
-int api_within(const char *what, double x, double least, double most, struct err *e)
-{
-	return x >= least && x <= most ? 0 : err_set(e, "%s is %g, not between %g and %g", what, x,
-	                                             least, most);
-}
-
-int api_threads(int threads)
-{
-	return threads > 0 ? threads : par_cpus();
-}
-
-int api_history(struct cache_info *i, const char *before, const char *call,
+static inline int api_history(struct cache_info *i, const char *before, const char *call,
                               const char *operand, struct err *e)
 {
 	static const struct history_option none = { 0 };
