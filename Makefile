@@ -176,7 +176,14 @@ bench-form-factors: all $(BUILD)/bench/rays
 	BUILD=$(abspath $(BUILD)) $(PYTHON) tests/bench/form_factors.py --tuned
 
 format:
-	clang-format -i lib/*/*.[ch] formats/*/*.[ch] formats/*/*.cc tools/*.c tools/common/*.[ch] tests/unit/*.[ch]
+	clang-format -i $(wildcard lib/*/*.[ch] formats/*/*.[ch] formats/*/*.cc tools/*.c tools/common/*.[ch] \
+		tests/unit/*.c tests/unit/fixtures/*.h tests/bench/*.c)
+
+# For clangd and its like.
+compile_commands.json: Makefile
+	@$(MAKE) -nB all unit $(BENCHES) | $(PYTHON) -c 'import json, os, re, sys; json.dump([ \
+		{"directory": os.getcwd(), "command": line.strip(), "file": line.split()[-1]} \
+		for line in sys.stdin if re.search(r" -c -o \S+ \S+$$", line)], sys.stdout, indent=1)' >$@
 
 # ---- installation ----
 
@@ -222,7 +229,7 @@ uninstall:
 	[ ! -d $(DEST)/share/twopass ] || rmdir --ignore-fail-on-non-empty $(DEST)/share/twopass
 
 clean:
-	rm -rf build build-san out
+	rm -rf build build-san out compile_commands.json
 
 .PHONY: all unit deps demo check check-fast check-layers check-man oracles bench report report-long \
 	bench-form-factors format install uninstall clean

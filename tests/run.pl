@@ -23,6 +23,7 @@ my $harness = TAP::Harness->new({
 		return [$file];
 	},
 });
+my $cmocka = qr/error: Failure!$|^# not ok - /;    # says again what the test line says
 my @lines;    # of failed tests, with the comments below them
 $harness->callback(made_parser => sub {
 	my ($parser, $job) = @_;
@@ -30,7 +31,8 @@ $harness->callback(made_parser => sub {
 	$parser->callback(ALL => sub {
 		my ($line) = @_;
 		$failing = !$line->is_ok if $line->is_test;
-		push @lines, "$name: " . $line->raw if $failing && $line->raw !~ /error: Failure!$/;
+		return if !$failing || !($line->is_test || $line->is_comment);
+		push @lines, "$name: " . $line->raw if $line->raw !~ $cmocka;
 	});
 });
 my $all = $harness->runtests(@ARGV);

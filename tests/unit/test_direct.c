@@ -71,12 +71,12 @@ static double lit(struct stage *t, double x, double y, int side, double *error)
 
 	for (uint32_t i = 0; i < t->m.element.n; i++) {
 		const double *v[3];
-		double w[3], area = 0, n[3];
+		double w[3], n[3];
 		for (int k = 0; k < 3; k++)
 			v[k] = &t->m.vertex[3 * (size_t)t->m.element.corner[3 * i + (uint32_t)k]];
 		for (int k = 0; k < 3; k++) {
 			v3_area(at, v[(k + 1) % 3], v[(k + 2) % 3], n);
-			area += w[k] = n[2];
+			w[k] = n[2];
 		}
 		if (v[0][2] != 0 || w[0] < -1e-12 || w[1] < -1e-12 || w[2] < -1e-12)
 			continue;
