@@ -3,9 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/vec3.h"
-
-static const double PI = 3.14159265358979323846;
 
 int model_camera_pose(const double affine[16], double to_world[16])
 {

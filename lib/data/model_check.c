@@ -5,11 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/index_check.h"
 #include "lib/base/mem.h"
 #include "lib/base/vec3.h"
-
-static const double pi = 3.14159265358979323846;
 
 static const double albedo_slack = MODEL_ALBEDO_SLACK;
 /* Rigid matrices come from float32 glTF numbers. */
@@ -143,7 +142,7 @@ static int check_light(const struct lights *l, size_t i, int bands, struct err *
 		return err_set(e, "array light_direction: light '%.100s': length %g instead of %d",
 		               l->name[i], length, l->kind[i] != LIGHT_POINT);
 	if (l->kind[i] == LIGHT_SPOT
-	        ? !(cone[0] >= 0 && cone[0] <= cone[1] && cone[1] > 0 && cone[1] <= pi / 2)
+	        ? !(cone[0] >= 0 && cone[0] <= cone[1] && cone[1] > 0 && cone[1] <= PI / 2)
 	        : cone[0] != 0 || cone[1] != 0)
 		return err_set(e, "array light_cone: light '%.100s': %g, %g are no cones", l->name[i],
 		               cone[0], cone[1]);
@@ -189,8 +188,8 @@ static int check_camera(const struct camera *c, struct err *e)
 	if (c->orthographic && !(c->xmag > 0 && c->ymag > 0 && isfinite(c->xmag + c->ymag)))
 		return err_set(e, "arrays camera_xmag, camera_ymag: camera '%.100s': %g x %g is "
 		               "no view", c->name, c->xmag, c->ymag);
-	if (!c->orthographic && !(c->yfov > 0 && c->yfov < pi))
-		return err_set(e, "array camera_yfov: camera '%.100s': %g is not between 0 and pi",
+	if (!c->orthographic && !(c->yfov > 0 && c->yfov < PI))
+		return err_set(e, "array camera_yfov: camera '%.100s': %g is not between 0 and PI",
 		               c->name, c->yfov);
 	if (!(c->aspect >= 0 && isfinite(c->aspect)))
 		return err_set(e, "array camera_aspect: camera '%.100s': %g is not an aspect",

@@ -3,10 +3,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/mem.h"
 #include "lib/base/vec3.h"
-
-static const double pi = 3.14159265358979323846;
 
 static void find_box(struct model *m)
 {
@@ -40,9 +39,9 @@ static double unit_flux(const struct lights *l, size_t light)
 
 	switch (l->kind[light]) {
 	case LIGHT_POINT:
-		return 4 * pi;
+		return 4 * PI;
 	case LIGHT_SPOT:
-		return 2 * pi * (1 - inner + (inner - outer) / 3);
+		return 2 * PI * (1 - inner + (inner - outer) / 3);
 	default:
 		faces(l, &l->direction[3 * light], area);
 		return area[0] + area[1] + area[2];
@@ -127,7 +126,7 @@ static void sphere_ray(const struct lights *l, size_t light, const double u[3], 
 
 	v3_frame(axis, t, b);
 	for (int k = 0; k < 3; k++)
-		dir[k] = c * axis[k] + s * (cos(2 * pi * u[1]) * t[k] + sin(2 * pi * u[1]) * b[k]);
+		dir[k] = c * axis[k] + s * (cos(2 * PI * u[1]) * t[k] + sin(2 * PI * u[1]) * b[k]);
 }
 
 /* Through a point of the box's faces that the light meets first, each as often as the light

@@ -18,14 +18,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/vec3.h"
 #include "lib/ff/row_light.h"
 #include "lib/ff_rays/ray_follow.h"
 #include "lib/ff_rays/ray_samples.h"
 #include "lib/scatter/bsdf.h"
 #include "lib/scatter/lobe.h"
-
-#define PI 3.14159265358979323846
 
 enum {
 	MIN_LOBE_RAYS = 16, MIN_EMITTER_RAYS = 64, /* for any one link and lobe */

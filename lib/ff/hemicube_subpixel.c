@@ -3,10 +3,9 @@
  * points themselves find out, each by a line to the element. */
 #include "lib/ff/hemicube_subpixel.h"
 
+#include "lib/base/constants.h"
 #include "lib/base/vec3.h"
 #include "lib/ff_rays/ray_samples.h"
-
-#define PI 3.14159265358979323846
 
 enum { ENOUGH = 2048 }; /* pixels, of all hemicubes, that show an element as well as lines do */
 

@@ -5,11 +5,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/vec3.h"
 #include "lib/ff_rays/ray_samples.h"
 #include "lib/geometry/solid_angle.h"
-
-#define PI 3.14159265358979323846
 
 enum { MOST_PAIRS = 1024, PILOT_PAIRS = 64 };
 

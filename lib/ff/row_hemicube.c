@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/vec3.h"
 #include "lib/ff/directional.h"
 #include "lib/ff/hemicube_subpixel.h"
@@ -20,8 +21,6 @@ enum {
 	CAPTURES = 4096,          /* light paths kept of a directional patch-side */
 	EMISSION_SAMPLES = 16384  /* lobe directions a row of an emission lobe */
 };
-
-#define PI 3.14159265358979323846
 
 static uint32_t *items(const struct ff_thread *t, uint32_t view, int side)
 {

@@ -5,9 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/vec3.h"
-
-#define PI 3.14159265358979323846
 
 /* From the centre of a triangle to its farthest corner, by the edges from one corner. */
 static double reach(const double a[4], const double b[4])

@@ -1,9 +1,8 @@
 #include "lib/geometry/contour.h"
 
+#include "lib/base/constants.h"
 #include "lib/base/vec3.h"
 #include "lib/geometry/point_polygon.h"
-
-#define PI 3.14159265358979323846
 
 enum { DEEPEST = 48 };        /* bisections of an edge, towards a corner it nearly meets */
 

@@ -1,8 +1,7 @@
 #include "lib/geometry/cubature.h"
 
+#include "lib/base/constants.h"
 #include "lib/base/vec3.h"
-
-#define PI 3.14159265358979323846
 
 typedef double four __attribute__((vector_size(32), aligned(8)));
 

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#define PI 3.14159265358979323846
+#include "lib/base/constants.h"
 
 static void put(struct point_polygon *p, double x, double y, double z)
 {

@@ -3,11 +3,10 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/mem.h"
 #include "lib/base/vec3.h"
 #include "lib/hemicube/hemicube_scene.h"
-
-static const long double PI = 3.141592653589793238462643383279502884L;
 
 /* Antiderivatives (in both face coordinates) of the solid angle and of the form
  * factor density cos(theta) / pi, on the planes z = 1 (top) and x = 1 (side, y
@@ -19,18 +18,24 @@ static long double corner_angle(long double x, long double y)
 	return atanl(x * y / sqrtl(1 + x * x + y * y));
 }
 
+/* 2 pi in long double, which PI is not. */
+static long double two_pi(void)
+{
+	return 8 * atanl(1);
+}
+
 static long double corner_top(long double x, long double y)
 {
 	long double a = 1 / sqrtl(1 + x * x), b = 1 / sqrtl(1 + y * y);
 
-	return (x * a * atanl(y * a) + y * b * atanl(x * b)) / (2 * PI);
+	return (x * a * atanl(y * a) + y * b * atanl(x * b)) / two_pi();
 }
 
 static long double corner_side(long double y, long double z)
 {
 	long double c = 1 / sqrtl(1 + z * z);
 
-	return -c * atanl(y * c) / (2 * PI);
+	return -c * atanl(y * c) / two_pi();
 }
 
 typedef long double corner_fn(long double x, long double y);
@@ -111,7 +116,7 @@ int ff_hemicube_grid_init(struct hemicube_grid *g, int n, struct err *e)
 	}
 	free(line);
 	scale_to(g->delta, g->pixels, 1);
-	scale_to(g->solid_angle, g->pixels, (double)(2 * PI));
+	scale_to(g->solid_angle, g->pixels, 2 * PI);
 	fill_directions(g);
 	return 0;
 }

@@ -4,14 +4,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/mem.h"
 #include "lib/base/parallel.h"
 #include "lib/base/vec3.h"
 #include "lib/interpolate/smooth_groups.h"
 
 /* As in interpolation: cos 30 degrees. */
-static const double cos_crease = .86602540378443865;
-
 /* The error of linear interpolation (root mean square over an element) over the second
  * difference, where that is the same all around, as in a curved field, and over its
  * variation, as at steps: as it is for such fields on jittered grids. */
@@ -315,7 +314,7 @@ int interp_discretisation(const struct model *m, struct solution *s, int threads
 	j.noise = mem_new(n, sizeof *j.noise, "irradiance", e);
 	j.variance = mem_new(n, sizeof *j.variance, "irradiance", e);
 	if (j.h && j.variance && j.difference && j.noise &&
-	    !interp_smooth_groups_new(m, cos_crease, &j.g, e)) {
+	    !interp_smooth_groups_new(m, COS_CREASE, &j.g, e)) {
 		take_parts(&j);
 		par_for(m->element.n, CHUNK, threads, differences, &j, NULL);
 		if (!by_patches(&j))

@@ -6,13 +6,11 @@
 #include <stdint.h>
 
 #include "lib/base/channels.h"
+#include "lib/base/constants.h"
 #include "lib/data/model.h"
 #include "lib/data/solution.h"
 #include "lib/interpolate/reconstruct.h"
 #include "lib/interpolate/smooth_groups.h"
-
-/* cos 30 degrees: flatter edges are smoothed over. */
-#define COS_CREASE .86602540378443865
 
 enum {
 	RINGS = 3,    /* of neighbours that a fit may reach */

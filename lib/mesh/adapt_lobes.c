@@ -7,11 +7,10 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/mem.h"
 #include "lib/base/vec3.h"
 #include "lib/mesh/stages.h"
-
-#define PI 3.14159265358979323846
 
 /* Of the squared deviations in a patch, what arrives where all of its light is smeared by a
  * lobe: as in adapt_patches.c. */

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/mem.h"
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
@@ -13,8 +14,6 @@
 #include "lib/occlusion/emitters.h"
 #include "lib/occlusion/facet_set.h"
 #include "lib/occlusion/visible_region.h"
-
-#define PI 3.14159265358979323846
 
 enum {
 	EXACT_MOST = 48,     /* emitters: of more, all are sampled */

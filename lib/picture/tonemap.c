@@ -4,9 +4,9 @@
 #include <stdint.h>
 #include <stdlib.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/mem.h"
 
-static const double pi = 3.14159265358979323846;
 static const double middle_grey = .18;
 static const float magenta[3] = { 1, 0, 1 };
 
@@ -173,7 +173,7 @@ size_t picture_tonemap_curve(const struct image *im, const int channel[3],
 void picture_tonemap_colour(double t, float rgb[3])
 {
 	static const double start = .5, rotations = -1.5, hue = 1.2;
-	double angle = 2 * pi * (start / 3 + 1 + rotations * t);
+	double angle = 2 * PI * (start / 3 + 1 + rotations * t);
 	double a = hue * t * (1 - t) / 2, x = a * cos(angle), y = a * sin(angle);
 
 	rgb[0] = (float)fmin(1, fmax(0, t - .14861 * x + 1.78277 * y));

@@ -3,10 +3,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/vec3.h"
 #include "lib/scatter/lobe.h"
-
-static const double pi = 3.14159265358979323846;
 
 /* A direction whose cosine is smaller than rounding of the dot product lies in
  * the surface: it belongs to no side and scatters nothing. */
@@ -92,7 +91,7 @@ static int transmits(enum bsdf_event event)
 static double lobe_pdf(enum lobe_kind kind, double k, double power, double cos_axis)
 {
 	if (kind == LOBE_RECIPROCAL)
-		return (k + 1) / (2 * pi) * power;
+		return (k + 1) / (2 * PI) * power;
 	return power / bsdf_lobe_normaliser(k, cos_axis);
 }
 
@@ -126,7 +125,7 @@ static double evaluate(const struct model *m, const struct parts *p, const doubl
 		return 0;
 	for (int i = 0; i < p->n; i++) {
 		const struct part *part = &p->part[i];
-		double scale = 1 / pi, density = b / pi;
+		double scale = 1 / PI, density = b / PI;
 		if (isinf(part->k) || transmits(part->event) != crosses)
 			continue;
 		if (part->event == BSDF_LOBE_R || part->event == BSDF_LOBE_T) {
@@ -264,7 +263,7 @@ double bsdf_exitance(const struct materials *mt, size_t material, int side, int 
 
 	if (black_side(mt, material, side))
 		return 0;
-	return 2 * pi * mt->emission[model_material_at(mt, material, side) + (size_t)band] /
+	return 2 * PI * mt->emission[model_material_at(mt, material, side) + (size_t)band] /
 	       (exponent + 1);
 }
 

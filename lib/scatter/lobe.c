@@ -3,10 +3,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
-
-static const double pi = 3.14159265358979323846;
 
 double bsdf_lobe_power(double k, double cos_gamma)
 {
@@ -46,23 +45,23 @@ static double beta_series(double p, double q, double z)
 
 double bsdf_lobe_normaliser(double k, double cos_theta)
 {
-	double whole = 2 * pi / (k + 1), a = .5 * (k + 1);
+	double whole = 2 * PI / (k + 1), a = .5 * (k + 1);
 	double y = cos_theta * cos_theta, x = 1 - y;
 
 	if (k == 1)
-		return .5 * pi * (1 + cos_theta);
+		return .5 * PI * (1 + cos_theta);
 	if (cos_theta <= 0)
 		return .5 * whole;
 	if (x <= 0)
 		return whole;
 	if (k == 0)
-		return 2 * (pi - acos(cos_theta));
+		return 2 * (PI - acos(cos_theta));
 	/* I(x; a, 1/2) <= x^a / cos theta, because the series' terms are below x^j. */
 	double exponent = a * log1p(-y);
 	if (exponent < -34 + log(cos_theta))
 		return whole;
 	/* x^a (1-x)^(1/2) / (a B(a, 1/2)); the series of I about the nearer end. */
-	double power = exp(exponent) * cos_theta / (sqrt(pi) * gamma_ratio(a));
+	double power = exp(exponent) * cos_theta / (sqrt(PI) * gamma_ratio(a));
 	if (x < .5)
 		return whole * (1 - .5 * power * beta_series(a, a, x));
 	return whole * .5 * (1 + 2 * a * power * beta_series(a, .5, y));
@@ -73,8 +72,8 @@ static double clamped_mean(double A, double B, double c)
 {
 	if (A - B >= 0 && A + B <= c)
 		return A / c;
-	double full = A + B <= c ? 0 : A - B >= c ? pi : acos((c - A) / B);
-	double none = A + B <= 0 ? 0 : A - B >= 0 ? pi : acos(-A / B);
+	double full = A + B <= c ? 0 : A - B >= c ? PI : acos((c - A) / B);
+	double none = A + B <= 0 ? 0 : A - B >= 0 ? PI : acos(-A / B);
 	double width = none - full, slope;
 	if (width > 1e-3) {
 		slope = (A * width + B * (sin(none) - sin(full))) / c;
@@ -82,7 +81,7 @@ static double clamped_mean(double A, double B, double c)
 		double middle = (A + B * cos(.5 * (none + full))) / c;
 		slope = width / 6 * (1 + 4 * fmin(fmax(middle, 0), 1));
 	}
-	return (full + slope) / pi;
+	return (full + slope) / PI;
 }
 
 /* Integral of (k+1) cos^k g sin g clamped_mean over g from lo to hi by the
@@ -97,10 +96,10 @@ static double albedo_piece(double k, double c, double s, double lo, double hi)
 	if (!(hi > lo))
 		return 0;
 	for (int i = -HALF; i <= HALF; i++) {
-		double t = i * step, q = .5 * pi * sinh(t);
+		double t = i * step, q = .5 * PI * sinh(t);
 		double g = lo + (hi - lo) / (1 + exp(-2 * q));
 		double cosine = cos(g), sine = sin(g);
-		double jacobian = .25 * pi * cosh(t) / (cosh(q) * cosh(q));
+		double jacobian = .25 * PI * cosh(t) / (cosh(q) * cosh(q));
 		sum += jacobian * (k + 1) * bsdf_lobe_power(k, cosine) * sine *
 		       clamped_mean(cosine * c, sine * s, c);
 	}
@@ -112,7 +111,7 @@ double bsdf_lobe_albedo(double k, double cos_theta)
 	double c = fmin(fmax(cos_theta, 1e-12), 1), s = sqrt(1 - c * c), theta = acos(c);
 	/* cos^(k+1) of the last angle is e^-40. */
 	double end = acos(exp(-40 / (k + 1)));
-	double twice = fmin(2 * theta, end), horizon = fmin(.5 * pi - theta, end);
+	double twice = fmin(2 * theta, end), horizon = fmin(.5 * PI - theta, end);
 	double first = fmin(twice, horizon), second = fmax(twice, horizon);
 
 	return albedo_piece(k, c, s, 0, first) + albedo_piece(k, c, s, first, second) +
@@ -134,7 +133,7 @@ void bsdf_lobe_sample_whole(double k, const double axis[3], const double u[2], d
 	/* cos^(k+1) is uniform; the sine without cancellation for large k. */
 	double l = log1p(-u[0]) / (k + 1);
 
-	in_frame(axis, sqrt(-expm1(2 * l)), exp(l), 2 * pi * u[1], out);
+	in_frame(axis, sqrt(-expm1(2 * l)), exp(l), 2 * PI * u[1], out);
 }
 
 void bsdf_lobe_sample(double k, const double axis[3], const double n[3], const double u[2],
@@ -171,7 +170,7 @@ double bsdf_lobe_scatter(enum lobe_kind kind, double k, const double axis[3], co
 
 void bsdf_sample_cosine(const double n[3], const double u[2], double out[3])
 {
-	in_frame(n, sqrt(u[0]), sqrt(1 - u[0]), 2 * pi * u[1], out);
+	in_frame(n, sqrt(u[0]), sqrt(1 - u[0]), 2 * PI * u[1], out);
 }
 
 void bsdf_lobe_mirror(const double l[3], const double n[3], double out[3])

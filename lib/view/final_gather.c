@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/mem.h"
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
@@ -12,8 +13,6 @@
 #include "lib/view/final_gather_rays.h"
 
 /* cos 30 degrees, as for interpolation. */
-#define COS_CREASE .86602540378443865
-
 /* Root mean square over an element of what linear interpolation misses, by the second
  * difference across an edge: h^2 f'' against h^2 f'' / sqrt(120). */
 static const double per_difference = .1;

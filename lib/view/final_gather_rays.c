@@ -4,11 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/mem.h"
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
-
-static const double pi = 3.14159265358979323846;
 
 enum {
 	PARTS = 4,              /* of the sequence, that a standard error comes from */
@@ -44,7 +43,7 @@ void view_gather_worker_free(struct gather_worker *w)
 	free(w->tails);
 }
 
-/* Cosine and sine of 2 pi u for a batch, u in [0, 1), to 1e-6: Taylor series of half the
+/* Cosine and sine of 2 PI u for a batch, u in [0, 1), to 1e-6: Taylor series of half the
  * angle, at most pi / 2. */
 static void turns(const float *u, float *cosine, float *sine)
 {
@@ -181,7 +180,7 @@ static void add_blur(struct gather_worker *w, const double d[3], uint32_t place,
 	const struct view_side *s = &v->side[2 * model_patch_material(m, m->element.patch[e]) + place % 2];
 	double square = v3_dot(d, d);
 	double part = fabs(v3_dot(d, w->normal) * v3_dot(d, &m->element.normal[3 * e])) * m->element.area[e] /
-	              (pi * square * square);
+	              (PI * square * square);
 
 	for (size_t k = 0; k < bands; k++)
 		w->blur[k] +=
@@ -275,8 +274,8 @@ static int settled(double part[PARTS][BANDS_MAX], int bands, double rays, double
 			mean += part[p][b] / PARTS;
 		for (int p = 0; p < PARTS; p++)
 			square += (part[p][b] - mean) * (part[p][b] - mean);
-		h[b] = pi * mean / rays;
-		error[b] = pi * together * sqrt(square / (PARTS * (PARTS - 1))) / rays;
+		h[b] = PI * mean / rays;
+		error[b] = PI * together * sqrt(square / (PARTS * (PARTS - 1))) / rays;
 		good &= error[b] <= relative * scale[b];
 	}
 	return good;
@@ -310,5 +309,5 @@ void view_gather_point(struct gather_worker *w, const double x[3], const double 
 		add_closes(w);
 	}
 	for (int b = 0; b < bands; b++)
-		to->common[b] = pi * sqrt(w->blur[b] / w->blurs);
+		to->common[b] = PI * sqrt(w->blur[b] / w->blurs);
 }

@@ -3,10 +3,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/vec3.h"
 #include "lib/scatter/lobe.h"
-
-static const double pi = 3.14159265358979323846;
 
 double view_lobe_per_density(const struct view_lobe_seen *l, enum lobe_kind kind, double cos_i)
 {
@@ -20,7 +19,7 @@ double view_lobe_density(const struct view_lobe_seen *l, enum lobe_kind kind, co
 {
 	double power = bsdf_lobe_power(l->k, v3_dot(l->axis, dir));
 
-	return kind == LOBE_RECIPROCAL ? (l->k + 1) / (2 * pi) * power
+	return kind == LOBE_RECIPROCAL ? (l->k + 1) / (2 * PI) * power
 	                               : power / bsdf_lobe_table_normaliser(l->table, l->cosine);
 }
 
@@ -32,7 +31,7 @@ double view_lobe_weight_at(const double dir[3], const void *arg)
 	if (!(cos_i > 0) || power == 0)
 		return 0;
 	return w->kind == LOBE_RECIPROCAL
-	     ? (w->l->k + 1) / (2 * pi) * power * cos_i / fmax(cos_i, w->l->cosine)
+	     ? (w->l->k + 1) / (2 * PI) * power * cos_i / fmax(cos_i, w->l->cosine)
 	     : power * cos_i / (w->l->cosine * bsdf_lobe_table_normaliser(w->l->table, cos_i));
 }
 

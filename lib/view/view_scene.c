@@ -3,10 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/mem.h"
 #include "lib/interpolate/discretisation.h"
-
-static const double pi = 3.14159265358979323846;
 
 static void make_lobe(struct view_lobe *lobe, const double *coefficient, int bands, double k)
 {
@@ -25,8 +24,8 @@ static void tabulate_side(const struct materials *mt, size_t material, int side,
 
 	s->black = side == BACK && mt->one_sided[material];
 	for (int b = 0; b < mt->bands; b++) {
-		s->here[b] = mt->rho_d[here + (size_t)b] / pi;
-		s->across[b] = mt->tau_d[across + (size_t)b] / pi;
+		s->here[b] = mt->rho_d[here + (size_t)b] / PI;
+		s->across[b] = mt->tau_d[across + (size_t)b] / PI;
 		s->diffuse |= s->here[b] > 0;
 		s->translucent |= s->across[b] > 0;
 		s->emits |= mt->emission[here + (size_t)b] > 0;
@@ -36,7 +35,7 @@ static void tabulate_side(const struct materials *mt, size_t material, int side,
 	          mt->beta[2 * material + (size_t)!side]);
 }
 
-/* U with L_e + M/pi + s U <= U for what one corner of an element-side shows, s its
+/* U with L_e + M/PI + s U <= U for what one corner of an element-side shows, s its
  * directional weight: then no tail brings more than the largest U of the scene. */
 static double corner_ceiling(const struct view_scene *v, size_t material, int side,
                              const float *h, int band)

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
 #include "lib/scatter/bsdf.h"
@@ -9,8 +10,6 @@
 #include "tests/unit/fixtures/check.h"
 
 #define COUNT(a) (sizeof(a) / sizeof *(a))
-
-static const double pi = 3.14159265358979323846;
 
 /* A tilted normal, so that no axis is special. */
 static const double n[3] = { 2. / 7, -3. / 7, 6. / 7 };
@@ -64,7 +63,7 @@ static void lobe_setup(struct lobe_case *c, double degrees)
 		coefficient[s] = .7;
 		mt->alpha[s] = mt->beta[s] = c->k;
 	}
-	direction(degrees * pi / 180, 1, c->known);
+	direction(degrees * PI / 180, 1, c->known);
 	bsdf_lobe_mirror(c->known, n, c->axis);
 	for (int i = 0; i < 3; i++) {
 		c->side[i] = c->transmitted ? -n[i] : n[i];
@@ -89,7 +88,7 @@ static int find_bin(const struct lobe_case *c, const double w[3])
 
 	v3_frame(c->axis, t, b);
 	double v = bsdf_lobe_power(c->k + 1, v3_dot(c->axis, w));
-	double phi = atan2(v3_dot(b, w), v3_dot(t, w)) / (2 * pi);
+	double phi = atan2(v3_dot(b, w), v3_dot(t, w)) / (2 * PI);
 	int ring = (int)fmin(v * RINGS, RINGS - 1);
 	int sector = (int)fmin((phi < 0 ? phi + 1 : phi) * SECTORS, SECTORS - 1);
 	return ring * SECTORS + sector;
@@ -106,9 +105,9 @@ static void expected_shares(const struct lobe_case *c, double *share)
 		double x = rng_sobol((uint32_t)(i % POINTS), 0, (uint64_t)bin), w[3];
 		double y = rng_sobol((uint32_t)(i % POINTS), 1, (uint64_t)bin);
 		double v = (bin / SECTORS + x + 0x1p-33) / RINGS;
-		bin_direction(c, v, 2 * pi * (bin % SECTORS + y) / SECTORS, w);
+		bin_direction(c, v, 2 * PI * (bin % SECTORS + y) / SECTORS, w);
 		/* dw = dv dphi / ((k+1) cos^k gamma) */
-		double jacobian = 2 * pi / ((c->k + 1) * pow(v, c->k / (c->k + 1)));
+		double jacobian = 2 * PI / ((c->k + 1) * pow(v, c->k / (c->k + 1)));
 		double p = bsdf_pdf(c->m, 0, n, c->known, c->transport, w) * jacobian /
 		           ((BINS - 1) * POINTS);
 		share[bin] += p;
@@ -223,14 +222,14 @@ enum { POLAR = 12, TURN = 16, FINE = 20, SPHERE = POLAR * TURN + 3, MIXED_DRAWS 
 static void mixed_shares(const struct model *m, const double known[3],
                          enum bsdf_transport transport, double *share)
 {
-	const double cell = 4 * pi / (POLAR * TURN * FINE * FINE);
+	const double cell = 4 * PI / (POLAR * TURN * FINE * FINE);
 	double rest = 1;
 
 	memset(share, 0, SPHERE * sizeof *share);
 	for (int i = 0; i < POLAR * FINE; i++)
 		for (int j = 0; j < TURN * FINE; j++) {
 			double z = 1 - 2 * (i + .5) / (POLAR * FINE), w[3];
-			direction(acos(z), 2 * pi * (j + .5) / (TURN * FINE), w);
+			direction(acos(z), 2 * PI * (j + .5) / (TURN * FINE), w);
 			double p = cell * bsdf_pdf(m, 0, n, known, transport, w);
 			share[i / FINE * TURN + j / FINE] += p;
 			rest -= p;
@@ -247,7 +246,7 @@ static int sphere_bin(const struct bsdf_sample *s)
 	if (s->event == BSDF_IDEAL_R || s->event == BSDF_IDEAL_T)
 		return SPHERE - 3 + (s->event == BSDF_IDEAL_T);
 	v3_frame(n, t, b);
-	double phi = atan2(v3_dot(b, s->w), v3_dot(t, s->w)) / (2 * pi);
+	double phi = atan2(v3_dot(b, s->w), v3_dot(t, s->w)) / (2 * PI);
 	int i = (int)((1 - v3_dot(n, s->w)) / 2 * POLAR);
 	int j = (int)((phi < 0 ? phi + 1 : phi) * TURN);
 	return (i < POLAR ? i : POLAR - 1) * TURN + (j < TURN ? j : TURN - 1);
@@ -258,12 +257,12 @@ static void quadrature_albedo(const struct model *m, const double known[3],
                               enum bsdf_transport transport, double *albedo)
 {
 	enum { STEPS = 600 };
-	double f[BANDS_MAX], cell = 4 * pi / (STEPS * STEPS);
+	double f[BANDS_MAX], cell = 4 * PI / (STEPS * STEPS);
 
 	memset(albedo, 0, (size_t)m->bands * sizeof *albedo);
 	for (int i = 0; i < STEPS * STEPS; i++) {
 		double z = 1 - 2 * (i / STEPS + .5) / STEPS, w[3];
-		direction(acos(z), 2 * pi * (i % STEPS + .5) / STEPS, w);
+		direction(acos(z), 2 * PI * (i % STEPS + .5) / STEPS, w);
 		int light = transport == BSDF_FROM_LIGHT;
 		bsdf_eval(m, 0, n, light ? known : w, light ? w : known, f);
 		for (int b = 0; b < m->bands; b++)
@@ -330,7 +329,7 @@ static void check_mixed(const struct model *m, double degrees,
 	struct mixed_sums sums;
 	int side = degrees < 90 ? FRONT : BACK;
 
-	direction(degrees * pi / 180, 2, known);
+	direction(degrees * PI / 180, 2, known);
 	mixed_shares(m, known, transport, share);
 	delta_share(m, side, transport, share);
 	if (m->lobe == LOBE_PAPER) /* the density misses nothing but the deltas */
@@ -402,7 +401,7 @@ static void test_reciprocity_ratio_table(void **state)
 			double a[3], b[3], ab, ba;
 			m.material.alpha[FRONT] = table[i].k;
 			direction(0, 0, a);
-			direction(degrees[j] * pi / 180, 4, b);
+			direction(degrees[j] * PI / 180, 4, b);
 			bsdf_eval(&m, 0, n, a, b, &ab);
 			bsdf_eval(&m, 0, n, b, a, &ba);
 			assert_near(ab / ba / table[i].ratio[j], 1, 1e-12);
@@ -424,9 +423,9 @@ static void test_exponent_one_is_diffuse(void **state)
 		given("i %d", i);
 		double from[3], to[3], f;
 		direction(0, 0, from);
-		direction(pi / 2 * rng_uniform(&r), 2 * pi * rng_uniform(&r), to);
+		direction(PI / 2 * rng_uniform(&r), 2 * PI * rng_uniform(&r), to);
 		bsdf_eval(&m, 0, n, from, to, &f);
-		assert_near(f * pi / .6, 1, 1e-12);
+		assert_near(f * PI / .6, 1, 1e-12);
 	}
 	model_materials_free(&m.material);
 }
@@ -444,8 +443,8 @@ static void test_reciprocal_lobe(void **state)
 		double a[3], b[3], ab, ba, k = pow(10, 6 * rng_uniform(&r) - 1);
 		for (int s = 0; s < 2; s++)
 			m.material.alpha[s] = m.material.beta[s] = k;
-		direction(pi * rng_uniform(&r), 2 * pi * rng_uniform(&r), a);
-		direction(pi * rng_uniform(&r), 2 * pi * rng_uniform(&r), b);
+		direction(PI * rng_uniform(&r), 2 * PI * rng_uniform(&r), a);
+		direction(PI * rng_uniform(&r), 2 * PI * rng_uniform(&r), b);
 		bsdf_eval(&m, 0, n, a, b, &ab);
 		bsdf_eval(&m, 0, n, b, a, &ba);
 		assert_near(ab, ba, 1e-12 * ab);
@@ -466,7 +465,7 @@ static void test_reciprocal_albedo(void **state)
 	for (int deg = 5; deg < 90; deg += 12) { /* 8 means within 4 standard errors */
 		given("deg %d", deg);
 		double known[3], mean = 0, square = 0;
-		direction(deg * pi / 180, 0, known);
+		direction(deg * PI / 180, 0, known);
 		for (int i = 0; i < N; i++) {
 			struct bsdf_sample s;
 			double u[3];
@@ -475,7 +474,7 @@ static void test_reciprocal_albedo(void **state)
 			mean += s.weight[0] / N;
 			square += s.weight[0] * s.weight[0] / N;
 		}
-		assert_near(mean, .8 * bsdf_lobe_albedo(20, cos(deg * pi / 180)),
+		assert_near(mean, .8 * bsdf_lobe_albedo(20, cos(deg * PI / 180)),
 		            4 * sqrt((square - mean * mean) / N));
 	}
 	model_materials_free(&m.material);
@@ -507,8 +506,8 @@ static void test_flipped_winding(void **state)
 		given("i %d", i);
 		double a[3], b[3], f[3], g[3], u[3];
 		struct bsdf_sample s, t;
-		direction(pi * rng_uniform(&r), 2 * pi * rng_uniform(&r), a);
-		direction(pi * rng_uniform(&r), 2 * pi * rng_uniform(&r), b);
+		direction(PI * rng_uniform(&r), 2 * PI * rng_uniform(&r), a);
+		direction(PI * rng_uniform(&r), 2 * PI * rng_uniform(&r), b);
 		bsdf_eval(&m, 0, n, a, b, f);
 		bsdf_eval(&turned, 0, other, a, b, g);
 		assert_memory_equal(f, g, sizeof f);
@@ -641,10 +640,10 @@ static void test_emission(void **state)
 		m.material.emission_exponent[BACK] = e;
 		for (int i = 0; i < 100000; i++) { /* midpoints in the cosine */
 			double c = (i + .5) / 100000;
-			direction(pi - acos(c), 0, w);
+			direction(PI - acos(c), 0, w);
 			bsdf_emission(&m, 0, n, w, &l);
 			assert_near(l, 3 * pow(c, e - 1), 1e-9);
-			flux += 2 * pi * l * c / 100000;
+			flux += 2 * PI * l * c / 100000;
 		}
 		assert_near(flux / bsdf_exitance(&m.material, 0, BACK, 0), 1, 1e-6);
 		direction(.3, 0, w);

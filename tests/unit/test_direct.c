@@ -7,10 +7,9 @@
 
 #include "tests/unit/fixtures/grid.h"
 
+#include "lib/base/constants.h"
 #include "lib/base/vec3.h"
 #include "lib/occlusion/direct.h"
-
-#define PI 3.14159265358979323846
 
 struct stage {
 	struct model m;

@@ -2,14 +2,13 @@
  * element against Lambert's formula for polygons. */
 #include <math.h>
 
+#include "lib/base/constants.h"
 #include "lib/ff/ff_job.h"
 #include "lib/ff/row_reciprocal.h"
 #include "lib/ff_rays/ray_budget.h"
 #include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/memory_ff.h"
 #include "tests/unit/fixtures/shapes.h"
-
-#define PI 3.14159265358979323846
 
 enum { CEILING = 1, SHELF = 6 };
 

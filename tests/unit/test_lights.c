@@ -2,6 +2,7 @@
  * against closed forms. */
 #include <math.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
 #include "lib/data/punctual.h"
@@ -12,8 +13,6 @@
 #include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/grid.h"
 #include "tests/unit/fixtures/memory_ff.h"
-
-#define PI 3.14159265358979323846
 
 static const double zero[3] = { 0, 0, 0 }, one[3] = { 1, 1, 1 };
 

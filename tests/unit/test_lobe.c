@@ -1,13 +1,12 @@
 /* Phong lobes: normaliser and albedo against tables, sampling against moments. */
 #include <math.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
 #include "lib/scatter/lobe.h"
 #include "lib/scatter/lobe_table.h"
 #include "tests/unit/fixtures/check.h"
-
-static const double pi = 3.14159265358979323846;
 
 enum { ANGLES = 9 };
 static const double angle[ANGLES] = { 0, 30, 45, 60, 75, 80, 85, 89, 90 };
@@ -94,7 +93,7 @@ static const struct {
 /* cos of degrees, exact at 90 */
 static double cosine(double degrees)
 {
-	return degrees == 90 ? 0 : cos(degrees * pi / 180);
+	return degrees == 90 ? 0 : cos(degrees * PI / 180);
 }
 
 static void test_normaliser_table(void **state)
@@ -143,13 +142,13 @@ static void test_normaliser_any_exponent(void **state)
 	for (double l = -3; l <= 8; l += .37)
 		for (int i = 1; i <= 40; i++) {
 			given("l %g, i %d", l, i);
-			double k = pow(10, l), c = i <= 20 ? cos(i * pi / 42) : pow(10, -.4 * (i - 20));
+			double k = pow(10, l), c = i <= 20 ? cos(i * PI / 42) : pow(10, -.4 * (i - 20));
 			assert_close(bsdf_lobe_normaliser(k, c), slow_normaliser(k, c), 1e-12);
 		}
 	for (double k = 0; k <= 1e8; k = 3 * k + .1) {
 		given("k %g", k);
-		assert_close(bsdf_lobe_normaliser(k, 1), 2 * pi / (k + 1), 1e-14);
-		assert_close(bsdf_lobe_normaliser(k, 0), pi / (k + 1), 1e-14);
+		assert_close(bsdf_lobe_normaliser(k, 1), 2 * PI / (k + 1), 1e-14);
+		assert_close(bsdf_lobe_normaliser(k, 0), PI / (k + 1), 1e-14);
 	}
 }
 
@@ -199,17 +198,17 @@ static double slow_albedo(double k, double theta)
 	double sum = 0, c = cos(theta), s = sin(theta);
 
 	for (int piece = 0; piece < 2; piece++) {
-		double lo = piece ? theta : 0, step = ((piece ? pi / 2 : theta) - lo) / CELLS;
+		double lo = piece ? theta : 0, step = ((piece ? PI / 2 : theta) - lo) / CELLS;
 		for (int i = 0; i < CELLS; i++) {
 			double t = lo + (i + .5) * step, ring = 0;
 			for (int j = 0; j < TURN; j++) {
-				double phi = (j + .5) * pi / TURN;
+				double phi = (j + .5) * PI / TURN;
 				ring += bsdf_lobe_power(k, c * cos(t) + s * sin(t) * cos(phi));
 			}
 			sum += ring * fmin(1, cos(t) / c) * sin(t) * step;
 		}
 	}
-	return sum * 2 * (pi / TURN) * (k + 1) / (2 * pi);
+	return sum * 2 * (PI / TURN) * (k + 1) / (2 * PI);
 }
 
 static void test_albedo(void **state)
@@ -221,7 +220,7 @@ static void test_albedo(void **state)
 		for (size_t j = 0; j < COUNT(theta); j++) {
 			given("k %g, %g degrees", k[i], theta[j]);
 			assert_close(bsdf_lobe_albedo(k[i], cosine(theta[j])),
-			             slow_albedo(k[i], theta[j] * pi / 180), 1e-6);
+			             slow_albedo(k[i], theta[j] * PI / 180), 1e-6);
 		}
 	for (double x = 0; x <= 1e6; x = 3 * x + .3) {
 		given("x %g", x);
@@ -265,7 +264,7 @@ static void test_sample_clipped(void **state)
 	for (int deg = 0; deg <= 90; deg += 10)
 		for (int s = 0; s < 2000; s++) {
 			given("deg %d, s %d", deg, s);
-			double axis[3] = { sin(deg * pi / 180), 0, cosine(deg) }, w[3], again[3];
+			double axis[3] = { sin(deg * PI / 180), 0, cosine(deg) }, w[3], again[3];
 			double u[2] = { rng_sobol((uint32_t)s, 0, 1), rng_sobol((uint32_t)s, 1, 1) };
 			bsdf_lobe_sample(deg * deg, axis, n, u, w);
 			bsdf_lobe_sample(deg * deg, axis, n, u, again);

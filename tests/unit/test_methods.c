@@ -8,9 +8,8 @@
 
 #include "tests/unit/fixtures/grid.h"
 
+#include "lib/base/constants.h"
 #include "lib/view/view.h"
-
-#define PI 3.14159265358979323846
 
 struct stage {
 	struct model m;

@@ -6,11 +6,11 @@
 #include <math.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/reference/pathtrace.h"
 #include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/grid.h"
 
-static const double pi = 3.14159265358979323846;
 static const double sigmas = 4;
 
 /* ---- scenes ---- */
@@ -37,7 +37,7 @@ static void set(struct model *m, size_t material, int side, double rho_d, double
 static void emit(struct model *m, size_t material, int side, double exitance)
 {
 	for (size_t b = 0; b < (size_t)m->bands; b++)
-		m->material.emission[model_material_at(&m->material, material, side) + b] = exitance / pi;
+		m->material.emission[model_material_at(&m->material, material, side) + b] = exitance / PI;
 }
 
 static void ready(struct scene *s)
@@ -208,7 +208,7 @@ static void test_furnace(void **state)
 	for (int b = 0; b < 3; b++) {
 		given("band %s", name[b]);
 		double mean = picture_mean(&im, name[b], &error);
-		check(name[b], mean, 1 / (1 - rho[b]) / pi, error, 0);
+		check(name[b], mean, 1 / (1 - rho[b]) / PI, error, 0);
 		assert_that(error, <, .02 * mean);
 	}
 	picture_image_free(&im);
@@ -239,7 +239,7 @@ static void test_furnace_mirror_mix(void **state)
 		given("patch %zu", patch);
 		check_patch(&s, &h, patch, FRONT, 0, 1);
 	}
-	check_picture(&s, inside, corner, 0, 64, 1 / pi, 0);
+	check_picture(&s, inside, corner, 0, 64, 1 / PI, 0);
 	pathtrace_irradiance_free(&h);
 	done(&s);
 }
@@ -302,7 +302,7 @@ static void test_parallel_squares(void **state)
 	check("escaped", h.escaped[0], 0.942917483174828, h.escaped_error[0], 0);
 	/* the upper square from below, B = .8 H */
 	check_picture(&s, (double[]){ .5, .5, .3 }, (double[]){ .5, .5, 1 }, .5, 64,
-	              .8 * 0.2031567818865611 / pi, 0);
+	              .8 * 0.2031567818865611 / PI, 0);
 	pathtrace_irradiance_free(&h);
 	done(&s);
 }
@@ -350,7 +350,7 @@ static void test_pane(void **state)
 	run_particles(&s, 200000, &h);
 	check_patch(&s, &h, 2, FRONT, 0, tau * f);
 	check_picture(&s, (double[]){ .5, .5, .3 }, (double[]){ .5, .5, 1 }, .5, 64,
-	              .7 * tau * tau * f / pi, 0);
+	              .7 * tau * tau * f / PI, 0);
 	pathtrace_irradiance_free(&h);
 	done(&s);
 }
@@ -424,9 +424,9 @@ static void test_partition(void **state)
 		check_patch(&s, &h, 4, FRONT, 0, floor);
 		check_patch(&s, &h, 5, FRONT, 0, ceiling);
 		check_picture(&s, (double[]){ .5, .5, .4 }, (double[]){ .5, .5, 0 }, .5, 100,
-		              (1 + .5 * floor) / pi, isinf(exponent[i]) ? 0 : .01);
+		              (1 + .5 * floor) / PI, isinf(exponent[i]) ? 0 : .01);
 		check_picture(&s, (double[]){ .5, .5, .6 }, (double[]){ .5, .5, 1 }, .5, 400,
-		              .4 * ceiling / pi, isinf(exponent[i]) ? 0 : .01);
+		              .4 * ceiling / PI, isinf(exponent[i]) ? 0 : .01);
 		assert_int_equal(pathtrace_diverges(&s.m), !isinf(exponent[i]));
 		s.m.lobe = LOBE_RECIPROCAL;
 		assert_false(pathtrace_diverges(&s.m));
@@ -455,10 +455,10 @@ static void test_reciprocal_both_ways(void **state)
 	emit(&s.m, 0, FRONT, 1);
 	ready(&s);
 	run_particles(&s, 400000, &h);
-	light = .6 / pi * patch_mean(&s, &h, 2, FRONT, 0, &error);
+	light = .6 / PI * patch_mean(&s, &h, 2, FRONT, 0, &error);
 	take_picture(&s, (double[]){ 1.5, .5, .5 }, (double[]){ 1.5, .5, 0 }, .5, 400, &im);
 	eye = picture_mean(&im, "R", &spread);
-	check("both ways", eye, light, hypot(spread, .6 / pi * error), 0);
+	check("both ways", eye, light, hypot(spread, .6 / PI * error), 0);
 	assert_that(spread, <, .02 * eye);
 	picture_image_free(&im);
 	pathtrace_irradiance_free(&h);
@@ -487,7 +487,7 @@ static void test_one_sided(void **state)
 			set(&s.m, 1, side, 0, 0, 0, .8);
 		emit(&s.m, 0, FRONT, 1);
 		ready(&s);
-		check_picture(&s, outside, middle, .49, 64, one_sided ? .8 * 2 / pi : 0, 0);
+		check_picture(&s, outside, middle, .49, 64, one_sided ? .8 * 2 / PI : 0, 0);
 		done(&s);
 	}
 }
@@ -502,7 +502,7 @@ static void test_emission_exponent(void **state)
 	(void)state;
 	grid_new(&s.m, 1, 1, 1, 1);
 	quad(&s, 0, -1, -1, 0, 2, 2);
-	emit(&s.m, 0, FRONT, pi);
+	emit(&s.m, 0, FRONT, PI);
 	s.m.material.emission_exponent[FRONT] = 4;
 	ready(&s);
 	check_picture(&s, above, origin, .1, 4, pow(.5, 1.5), 1e-6);

@@ -1,12 +1,11 @@
 /* Facets, their form factors by contour and by cubature: against closed forms. */
 #include <math.h>
 
+#include "lib/base/constants.h"
 #include "lib/geometry/contour.h"
 #include "lib/geometry/exchange_unoccluded.h"
 #include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/polygon_scene.h"
-
-static const double pi = 3.14159265358979323846;
 
 static struct facet facet_of(int n, const double *v)
 {
@@ -49,7 +48,7 @@ static void test_point_small_and_far(void **state)
 	for (double c = 1e-3; c < 2e3; c *= 10) {
 		given("c %g", c);
 		const double v[] = { 0, 0, c, 0, 1, c, 1, 1, c, 1, 0, c };
-		double p = 1 / hypot(1, c), exact = p * atan(p) / pi;
+		double p = 1 / hypot(1, c), exact = p * atan(p) / PI;
 		/* The terms of far polygons cancel: absolute to rounding. */
 		assert_near(geo_contour_point(x, up, 4, v), exact, 2e-16);
 	}
@@ -80,7 +79,7 @@ static double perpendicular(const double x[2], const double y[2], const double e
 		double g = (h > 0 ? d * h * atan(d / h) : 0) - (r2 > 0 ? .25 * (h2 - d * d) * log(r2) : 0);
 		sum += __builtin_parity((unsigned)n) ? -g : g;
 	}
-	return sum / (2 * pi);
+	return sum / (2 * PI);
 }
 
 static double perpendicular_contour(const double x[2], const double y[2], const double eta[2],
@@ -256,8 +255,8 @@ static void test_cubature_weights(void **state)
 		given("n %d", n);
 		double v[FACET_CORNERS * 3], a = roll(&d, .3, 1), b = roll(&d, .3, 1);
 		for (int i = 0; i < n; i++) {
-			v[3 * i] = a * cos(2 * pi * i / n);
-			v[3 * i + 1] = b * sin(2 * pi * i / n);
+			v[3 * i] = a * cos(2 * PI * i / n);
+			v[3 * i + 1] = b * sin(2 * PI * i / n);
 			v[3 * i + 2] = .5 * v[3 * i];
 		}
 		struct facet f = facet_of(n, v);
@@ -458,7 +457,7 @@ static void test_facet_parts(void **state)
 		roll_frame(&d, 0, frame);
 		for (int i = 0; i < n; i++)
 			for (int c = 0; c < 3; c++)
-				v[3 * i + c] = a * cos(2 * pi * i / n) * frame[0][c] + sin(2 * pi * i / n) * frame[1][c];
+				v[3 * i + c] = a * cos(2 * PI * i / n) * frame[0][c] + sin(2 * PI * i / n) * frame[1][c];
 		struct facet f = facet_of(n, v);
 		struct facet_room part[4];
 		roll_frame(&d, 0, plane);

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "formats/cache/ff_file.h"
+#include "lib/base/constants.h"
 #include "lib/radiosity/shoot.h"
 #include "lib/scatter/bsdf.h"
 #include "tests/unit/fixtures/check.h"
@@ -25,7 +26,7 @@ static void set_diffuse(struct model *m, size_t material, double rho, double exi
 
 	mt->one_sided[material] = 1;
 	mt->rho_d[model_material_at(mt, material, FRONT)] = rho;
-	mt->emission[model_material_at(mt, material, FRONT)] = exitance / 3.14159265358979323846;
+	mt->emission[model_material_at(mt, material, FRONT)] = exitance / PI;
 }
 
 /* Solves; h[i] is the area mean of the irradiance of patch-side side[i]. */

@@ -2,12 +2,11 @@
  * against Lambert's formula. */
 #include <math.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
 #include "lib/geometry/solid_angle.h"
 #include "tests/unit/fixtures/check.h"
-
-static const double pi = 3.14159265358979323846;
 
 /* Near and wide, far and small, a needle, one seen at a slant. */
 static const double triangle[][3][3] = {
@@ -37,7 +36,7 @@ static void octant(void **state)
 {
 	const double v[] = { 3, 0, 0, 0, 1, 0, 0, 0, 2 }, x[3] = { 0 };
 	(void)state;
-	assert_near(geo_solid_angle(v, x), pi / 2, 1e-14);
+	assert_near(geo_solid_angle(v, x), PI / 2, 1e-14);
 }
 
 static void samples(void **state)

@@ -4,6 +4,7 @@
 #include "lib/audit/patch_matrix.h"
 #include "lib/audit/side_table.h"
 #include "lib/audit/verify.h"
+#include "lib/base/constants.h"
 #include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/small_scene.h"
 
@@ -181,7 +182,7 @@ static void test_side_rows(void **state)
 	assert_near(back.h[0], (.5 + .25 + .125) * 3, 1e-14); /* the ramps at row 1, band 0 */
 	assert_near(back.m[0], .5 * back.h[0], 1e-14);
 	solution_side_row(&m, NULL, 4, &front);
-	assert_near(front.e[0], 100 * 3.14159265358979323846, 1e-14);
+	assert_near(front.e[0], 100 * PI, 1e-14);
 	solution_free(&s);
 	model_free(&m);
 }
