@@ -159,19 +159,19 @@ oracles: all
 bench: all $(BENCHES)
 	BUILD=$(abspath $(BUILD)) sh tests/bench/run.sh
 
-# One page of all that is measured, in less than 20 minutes; FULL=1: more, in hours;
-# README=1: its tables and plot into README.md, too.
+# One page of all that is measured, in less than 20 minutes; FULL=1: more, in hours. Its
+# tables and its plot go into RESULTS.md and README.md, too.
 REPORT := BUILD='$(abspath $(BUILD))' CC='$(CC)' OPT='$(OPT)' PYTHON='$(PYTHON)' \
-	$(PYTHON) tests/bench/report $(if $(FULL),--full) $(if $(README),--readme README.md) --out
+	$(PYTHON) tests/bench/report $(if $(FULL),--full) --into tests/bench/RESULTS.md --into README.md --out
 report: all $(BUILD)/bench/rays
 	@$(REPORT) $(BUILD)/report
-	$(if $(README),cp $(BUILD)/report/speed.png scenes/pictures/speed.png)
+	cp $(BUILD)/report/speed.png scenes/pictures/speed.png
 
 # What takes minutes a row and so is not in it.
 report-long: all
 	@$(REPORT) $(BUILD)/report-long --only speed-long
 
-# The README's table of form factors between patches.
+# What RESULTS.md says of form factors between patches, to be put there by hand.
 bench-form-factors: all $(BUILD)/bench/rays
 	BUILD=$(abspath $(BUILD)) $(PYTHON) tests/bench/form_factors.py --tuned
 

@@ -185,7 +185,7 @@ def main():
     p.add_argument("--scene", action="append", help="default: " + ", ".join(SCENES))
     p.add_argument("--run", action="append", help="options of ffcalc; default: " + ", ".join(RUNS))
     p.add_argument("--tuned", action="store_true",
-                   help="one run a scene: analytic, at the target that README.md quotes")
+                   help="one run a scene: analytic, at the target that RESULTS.md quotes")
     p.add_argument("--repeat", type=int, default=3, help="runs whose median is printed (3)")
     p.add_argument("--rays", type=int, default=409600, help="rays a patch of that yardstick")
     p.add_argument("--fresh", action="store_true", help="make yardsticks anew")

@@ -1,13 +1,14 @@
 #!/usr/bin/python3
 # tier: slow
 """The parts of `make report`: which pixels are compared, errors without the yardstick's
-noise, fits, and a page of tiny samples."""
+noise, fits, a page of tiny samples, and the tables in RESULTS.md and README.md."""
 import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
+from types import SimpleNamespace as Some
 
 import numpy as np
 
@@ -18,7 +19,10 @@ sys.path[:0] = [REPORT, os.path.join(TESTS, "exact"), os.path.join(TESTS, "indep
                 os.path.join(os.path.dirname(TESTS), "scenes")]
 from chain import BUILD, TOP, Tap, picture, run
 from growth import Fit
+from page import replace_tables
+from views import DEFAULT
 from yardstick import Errors, Ladder, Lattice, off
+import summary
 
 
 def lattice_depths(folder, width, height):
@@ -75,12 +79,15 @@ def curves(tap):
     tap.ok(Fit(x, 1e-9 * x, .01).exponent is None, "no exponent from times that are too short")
 
 
+KEPT = "<!-- kept: a command -->\n| old | figures |\n<!-- end -->\n"
+
+
 def page(tap, folder):
-    readme = os.path.join(folder, "README.md")
-    with open(readme, "w", encoding="utf-8") as f:
-        f.write("Before.\n\n<!-- views -->\n| old |\n<!-- end -->\n\nAfter.\n")
+    results = os.path.join(folder, "RESULTS.md")
+    with open(results, "w", encoding="utf-8") as f:
+        f.write(f"Before.\n\n<!-- views -->\n| stale |\n<!-- end -->\n\n{KEPT}\nAfter.\n")
     done = subprocess.run([sys.executable, REPORT, "--quick", "--only", "views", "--only", "exact",
-                           "--out", folder, "--readme", readme],
+                           "--out", folder, "--into", results],
                           capture_output=True, text=True, check=False,
                           env={**os.environ, "BUILD": BUILD})
     tap.ok(done.returncode == 0, "a page of tiny samples", *done.stderr.splitlines()[-3:])
@@ -94,10 +101,45 @@ def page(tap, folder):
                for n in ("index.html", "report.txt")), "page and text have the table of bars")
     tap.ok(all("furnace_hetero_diffuse" in text[n] for n in ("index.html", "report.txt")),
            "and exact answers, which were found side by side")
-    with open(readme, encoding="utf-8") as f:
-        words = f.read()
-    tap.ok(words.startswith("Before.") and words.endswith("After.\n") and "| view 1 |" in words
-           and "old" not in words, "a table is put in its place in a README", words)
+    words = contents(results)
+    tap.ok(words.startswith("Before.") and words.endswith(KEPT + "\nAfter.\n") and "| view 1 |" in words
+           and "stale" not in words, "a table is put in its place, and the rest is kept", words)
+
+
+def contents(path):
+    with open(path, encoding="utf-8") as f:
+        return f.read()
+
+
+def view(scene, solution, options, error):
+    return Some(solved=Some(scene=Some(name=scene), solution=solution), name=options, cpu=.06,
+                seconds=lambda: .64, errors=Some(rmse=error))
+
+
+def documents(tap, folder):
+    """What a whole report puts in README.md and RESULTS.md, as they are."""
+    lamps, factors = view("lamps", None, "", .02), {"patches": "6", "ffcalc": "`-m x`", "user": "0.10",
+                                                    "row sums": "1e-8", "max": "2e-9", "worst": "3e-7"}
+    run = Some(views=[view("cornell", DEFAULT, "-d direct", .01), view("cornell", DEFAULT, "-d mesh", .03),
+                      view("cornell", None, "-d gather", .04)],
+               rows=[Some(scene="cornell", by_default=lamps), Some(scene="lamps", by_default=None),
+                     Some(scene="lamps", by_default=lamps)],
+               factors=[{"scene": "cube16", **factors}, {"scene": "cube24", **factors}])
+    table = summary.table(run)
+    tap.ok([row[0].split("`")[1] for row in table.rows] == ["cornell", "lamps", "cube16"]
+           and table.rows[0][1:4] == ["0.64", "0.06", "1.00 %"] and "3e-7 relative" in table.rows[2][3]
+           and "Radiance" in table.rows[0][4] and "View3D" in table.rows[2][4],
+           "the defaults of each scene and form factors, beside other programs", *map(str, table.rows))
+    for name, places in (("README.md", ["summary"]),
+                         ("tests/bench/RESULTS.md", ["machine", "speed", "speed-long", "views"])):
+        path = os.path.join(folder, "document.md")
+        shutil.copy(os.path.join(TOP, name), path)
+        before = contents(path)
+        kept = [part for part in before.split("<!-- ") if part.startswith("kept: ")]
+        replace_tables(path, {place: table for place in places})
+        after = contents(path)
+        tap.ok(after.count(table.compact()) == len(places) and all(part in after for part in kept),
+               f"{name} has a place for {', '.join(places)}")
 
 
 def main():
@@ -108,6 +150,7 @@ def main():
         errors(tap)
         curves(tap)
         page(tap, folder)
+        documents(tap, folder)
     finally:
         shutil.rmtree(folder)
     sys.exit(tap.finish())

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """One page about speed and accuracy: index.html with plots, report.txt with the same tables.
 
-report [--out DIR] [--full] [--quick] [--only SECTION]...
+report [--out DIR] [--into FILE]... [--full] [--quick] [--only SECTION]...
 
 Everything is measured anew, in less than 20 minutes on two idle processors; the last
 table says where they went. --full adds what takes longer, --quick takes so few samples
@@ -30,6 +30,7 @@ import page
 import rates
 import speed
 import stated
+import summary
 import views
 from chain import Failed
 from jobs import workers
@@ -74,7 +75,8 @@ class Run:
 
     def __init__(self, plan, out, work):
         self.plan, self.out, self.work = plan, out, work
-        self.scenes, self.rows, self.views, self.bars, self.readme = {}, [], [], [], {}
+        self.scenes, self.rows, self.views, self.bars, self.tables = {}, [], [], [], {}
+        self.factors = []
         self.jobs, self.times, self.spent = {}, [], Spent()
         self.pool = workers()
 
@@ -170,6 +172,9 @@ def write(run, names):
             blocks += [Title(name), Words(f"Could not be measured: {e}")]
         run.times.append([name, *(f"{s:.0f}" for s in spent.seconds())])
         whole = len(names) == len(SECTIONS) == i + 1
+        if whole and not failed:
+            run.tables["machine"] = page.Table("", ["", ""], [list(pair) for pair in machine()], left=2)
+            run.tables["summary"] = summary.table(run)
         page.write(run.out, "twopass: speed and accuracy",
                    [*head(run, begun, whole), *blocks, *foot(run)])
     return failed
@@ -184,7 +189,8 @@ def arguments():
     p.add_argument("--quick", action="store_true", help="tiny samples")
     p.add_argument("--only", action="append", choices=[*SECTIONS, *APART],
                    help="this section, may be repeated")
-    p.add_argument("--readme", metavar="FILE", help="put the tables of these sections in this file")
+    p.add_argument("--into", metavar="FILE", action="append", default=[],
+                   help="put the tables of these sections in this file, may be repeated")
     return p.parse_args()
 
 
@@ -194,8 +200,8 @@ def main():
     run = Run(FULL if o.full else QUICK if o.quick else PLAN, o.out, work)
     try:
         failed = write(run, o.only or list(SECTIONS))
-        if o.readme:
-            page.replace_tables(o.readme, run.readme)
+        for path in o.into:
+            page.replace_tables(path, run.tables)
     except Failed as e:
         sys.exit(f"report: {e}")
     finally:

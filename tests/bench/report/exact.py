@@ -123,6 +123,7 @@ def form_factors(run):
     printed, _ = script(FORM_FACTORS, "--tuned", "--fresh", "--repeat", plan.repeat,
                         "--rays", plan.ff_rays, *words)
     head, rows, rest = markdown(printed)
+    run.factors = [dict(zip(head, row)) for row in rows]
     yield Title("Form factors between patches, beside View3D")
     yield Words("""`tests/bench/form_factors.py` on one core: *of bare* is the time over that of
         a bare Embree loop over 4 million rays; *row sums* the largest error of a row's sum

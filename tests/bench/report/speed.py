@@ -15,10 +15,11 @@ OTHERS = [Solution("`mesh -e 2%`", ["-e", "2%"]),
           Solution("`mesh -e 2%`, `ffcalc -n 16384`", ["-e", "2%"], ["-n", 16384])]
 LONG = ("two-pass", "analytic")
 # One position in a pixel, its centre, for the yardstick has that too.
-SMOOTH = ["-d", "mesh", "--samples", 1, "--lobe-samples", 16]
+CENTRES = ["--samples", 1]
+SMOOTH = ["-d", "mesh", *CENTRES, "--lobe-samples", 16]
 HEAD = ["scene", "setting", "mesh", "ffcalc", "shoot", "first view", "further view", "MB",
         "picture", "of reference", "bias", "99 %", "irradiance", "of reference"]
-README = (0, 1, 3, 4, 5, 8, 10, 12)  # its columns
+SHORT = (0, 1, 3, 4, 5, 8, 10, 12)  # columns of RESULTS.md
 
 
 def percent(x, digits=1):
@@ -41,6 +42,8 @@ class Row:
         self.scene, self.method, self.name = scene.name, solution.method, solution.name
         self.solved = Solved(scene, solution, repeat)
         self.view = View(self.solved, " ".join(map(str, SMOOTH)), SMOOTH, repeat, further=True)
+        default = solution.ffcalc == words_of(*DEFAULTS)
+        self.by_default = View(self.solved, "", CENTRES, repeat) if default else None
 
     def cells(self, ladders):
         solved, view, e = self.solved, self.view, self.view.errors
@@ -51,14 +54,18 @@ class Row:
                 percent(ladders[1].at(solved.seconds())) if solved.irradiance else "–"]
 
 
+def words_of(method, options):
+    """Of ffcalc."""
+    return ["-m", method, *options.split()]
+
+
 def solutions(scene, plan):
     for method in plan.methods(scene.name):
         for options in METHODS[method][:plan.settings(scene.name, method)]:
-            words = ["-m", method, *options.split()]
             name = f"`-m {method} {options}`"
             if (method, options) == DEFAULTS:
                 name += ", the defaults"
-            yield Solution(name, ffcalc=words, method=method)
+            yield Solution(name, ffcalc=words_of(method, options), method=method)
     yield from OTHERS[:plan.settings(scene.name, None)]
 
 
@@ -118,15 +125,15 @@ def section(run):
         for s in run.scenes.values()) + ". " + run.plan.left_out())
     yield draw(run.out, "speed", "error against processor seconds of four methods of form factors "
                "in three scenes, picture and irradiance, beside path tracing", drawn)
-    run.readme["speed"] = short(rows)
+    run.tables["speed"] = short(rows)
     yield Table("", HEAD, rows, left=2)
     if failed:
         yield Words("Could not be had: " + "; ".join(failed) + ".")
 
 
 def short(rows):
-    """The README's table."""
-    pick = lambda row: [row[c] for c in README]
+    """The table of RESULTS.md."""
+    pick = lambda row: [row[c] for c in SHORT]
     return Table("", pick(HEAD), [pick(row) for row in rows], left=2)
 
 
@@ -139,12 +146,12 @@ def long_section(run):
     name, method = LONG
     scene, rows = run.scene(name), []
     for options in run.told(f"{method} on {name}", METHODS[method]):
-        words = ["-m", method, *options.split()]
+        words = words_of(method, options)
         solution = Solution(f"`{' '.join(words)}`", ffcalc=words, method=method)
         rows.append(Row(scene, solution, run.plan.repeat))
     ladders = (scene.picture_ladder(run.plan.ladder), scene.irradiance_ladder(run.plan.crowd))
     cells = [row.cells(ladders) for row in rows]
-    run.readme["speed-long"] = short(cells)
+    run.tables["speed-long"] = short(cells)
     yield Title(f"Speed against error: {method} on {name}")
     yield Table("", HEAD, cells, left=2)
 

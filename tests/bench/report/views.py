@@ -8,7 +8,7 @@ from measure import ran
 from page import Bar, Table, Title, Words
 from plot import Curve, Panel, draw
 from setting import Solution, Solved, View
-from speed import percent, seconds
+from speed import CENTRES, percent, seconds
 from yardstick import QUANTILES
 
 MESH, DIRECT, GATHER = "-d mesh", "-d direct", "-d gather"
@@ -32,7 +32,6 @@ TRACED = [  # solutions and options of trace, from fast to fine
     (refined("-p 7% -e 4%", .01, 2, 8192), [MESH, DIRECT]),
     (refined("-p 7% -e 4%", .01, 2, 16384), [DIRECT, GATHER, "-d gather --gather-rays 2048"]),
     (refined("-e 4%", .005, 2, 16384), [MESH, DIRECT])]
-CENTRES = ["--samples", 1]
 FIRST = [(.045, .5), (.02, 1), (.01, 2.5), (.005, 10)]           # error, processor seconds
 FURTHER = [("mesh", .02, .05), ("direct", .01, .4), ("gather", .005, 3)]
 RADIANCE = [(3, .045), (5, .035), (17, .022), (52, .015)]        # rpict, measured before
@@ -61,7 +60,7 @@ def views_of(scene, plan):
 
 HEAD = ["solution", "trace", "elements", "view 1", "view 2 …", "error", "bias", "95 %", "99 %",
         "stated", "reference, as view 1", "as view 2 …"]
-README = slice(0, 9)  # its columns
+SHORT = slice(0, 9)  # columns of RESULTS.md
 
 
 def cells(view, ladder):
@@ -162,7 +161,7 @@ def section(run):
                    Panel("each further view", "seconds of one processor", "relative rmse, %",
                          further + [reference])])
     rows = [cells(v, ladder) for v in views]
-    run.readme["views"] = Table("", HEAD[README], [row[README] for row in rows], left=2)
+    run.tables["views"] = Table("", HEAD[SHORT], [row[SHORT] for row in rows], left=2)
     yield Table("", HEAD, rows, left=2)
     refused = list(dict.fromkeys(v.words for v in every if isinstance(v, Refused)))
     if refused:
