@@ -122,7 +122,7 @@ CHECKS := $(sort $(wildcard tests/tools/*.t tests/tools/*.py))
 TESTS := $(UNIT_TESTS) $(CHECKS)
 RUN = BUILD=$(abspath $(BUILD)) PYTHON=$(PYTHON) ONLY='$(ONLY)' tests/run.pl -j 2
 
-ifndef T
+ifneq ($(origin T),command line)
 check: deps
 	@$(MAKE) --no-print-directory -j2 all unit
 	@$(MAKE) --no-print-directory check-layers check-man
