@@ -45,7 +45,7 @@ struct ff_file {
 	char **surface_name;       /* [surfaces] */
 	char **light_name;         /* [scene.lights] */
 	const uint32_t *patch_surface;
-	struct vec made;           /* void *: arrays that the file leaves out, see ff(5) */
+	struct array made;         /* void *: arrays that the file leaves out, see ff(5) */
 };
 
 /* Opens and checks all (digests, monotone starts, ranges against `m`, finite and

@@ -11,7 +11,7 @@ enum { WORTH_SHARING = 8 };
 
 void file_ff_packed_free(struct ff_packed *p)
 {
-	struct vec *v[] = { &p->word, &p->block_column, &p->column, &p->value, &p->start, &p->scale };
+	struct array *v[] = { &p->word, &p->block_column, &p->column, &p->value, &p->start, &p->scale };
 
 	for (size_t i = 0; i < sizeof v / sizeof *v; i++)
 		free(v[i]->data);
@@ -31,7 +31,7 @@ static uint64_t count_spans(const struct ff *f, uint64_t block)
 }
 
 /* Appends the words of a block. 1 if they are spans, 0 if a list, -1 and e. */
-static int pack_block(const struct ff *f, uint64_t block, struct vec *word, struct err *e)
+static int pack_block(const struct ff *f, uint64_t block, struct array *word, struct err *e)
 {
 	const uint64_t first = f->block.start[block], n = f->block.start[block + 1] - first;
 	const uint64_t spans = count_spans(f, block);

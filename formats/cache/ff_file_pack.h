@@ -16,11 +16,11 @@ struct ff_known {
 
 /* Scratch of one file, begin with {0}; release with file_ff_packed_free. */
 struct ff_packed {
-	struct vec word, block_column;               /* uint32_t, uint64_t */
+	struct array word, block_column;             /* uint32_t, uint64_t */
 	uint64_t words;                              /* of all batches */
 	struct ff_known known[FF_PACK_KNOWN];        /* the last `packed` of them, in turn */
 	uint64_t packed;
-	struct vec column, value, start, scale;      /* of a batch summed by patch */
+	struct array column, value, start, scale;    /* of a batch summed by patch */
 };
 
 void file_ff_packed_free(struct ff_packed *p);

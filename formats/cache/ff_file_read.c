@@ -50,7 +50,7 @@ static int get_counts(const struct container *c, struct ff *f, struct err *e)
 }
 
 static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
-                      uint32_t **most, struct vec *made, struct err *e)
+                      uint32_t **most, struct array *made, struct err *e)
 {
 	const int f64 = value_type(c) == DT_F64, narrow = column_type(c) == DT_U16;
 	const struct field_or_not field[] = {

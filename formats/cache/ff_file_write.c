@@ -53,8 +53,8 @@ static const struct {
 struct ff_writer {
 	struct container_writer *container;
 	char geometry_id[33];      /* of the model; .ff files depend on nothing else */
-	struct vec shifted;        /* scratch for indices moved behind earlier batches */
-	struct vec narrow;         /* scratch for words of 16 bits */
+	struct array shifted;      /* scratch for indices moved behind earlier batches */
+	struct array narrow;       /* scratch for words of 16 bits */
 	struct ff_packed packed;
 	const struct model *m;
 	uint64_t rows, blocks, entries, arrivals;
@@ -270,7 +270,7 @@ static int put_rows_and_blocks(struct ff_writer *w, const struct ff *b, struct e
 	       put_starts(w, BLOCK_ARRIVAL, b->block.arrival, b->block.n, w->arrivals, e) ? -1 : 0;
 }
 
-static int put_words(struct ff_writer *w, const struct vec *word, struct err *e)
+static int put_words(struct ff_writer *w, const struct array *word, struct err *e)
 {
 	const uint32_t *from = word->data;
 

@@ -14,14 +14,14 @@
 
 enum { BUFFER = 1 << 20 };
 
-struct array {
+struct tensor {
 	char *name;
 	enum dtype type;
 	int dims;
 	uint64_t shape[CONTAINER_DIMS];
 	uint64_t bytes;        /* received so far */
 	struct digest *digest;
-	struct vec buffer;     /* bytes not spooled: all of a small array */
+	struct array buffer;   /* bytes not spooled: all of a small array */
 	FILE *spool;           /* NULL while everything fits the buffer */
 	char hex[CONTAINER_HEX + 1];
 };
@@ -30,12 +30,12 @@ struct container_writer {
 	char *path;
 	struct atomic_file *file;
 	json_t *meta;
-	struct vec arrays;     /* struct array */
+	struct array arrays;   /* struct tensor */
 };
 
-static struct array *array_at(const struct container_writer *w, size_t i)
+static struct tensor *array_at(const struct container_writer *w, size_t i)
 {
-	return (struct array *)w->arrays.data + i;
+	return (struct tensor *)w->arrays.data + i;
 }
 
 void file_container_abandon(struct container_writer *w)
@@ -45,7 +45,7 @@ void file_container_abandon(struct container_writer *w)
 	if (!w)
 		return;
 	for (size_t i = 0; i < w->arrays.n; i++) {
-		struct array *a = array_at(w, i);
+		struct tensor *a = array_at(w, i);
 		free(a->name);
 		free(a->buffer.data);
 		if (a->digest)
@@ -112,14 +112,14 @@ static int check_declaration(const struct container_writer *w, const char *name,
 int file_container_array(struct container_writer *w, const char *name, enum dtype t, int dims,
                          const uint64_t *shape, struct err *e)
 {
-	struct array a = { .type = t, .dims = dims };
+	struct tensor a = { .type = t, .dims = dims };
 
 	if (check_declaration(w, name, dims, e))
 		return -1;
 	memcpy(a.shape, shape, (size_t)dims * sizeof *shape);
 	if (mem_append(&w->arrays, &a, 1, sizeof a, e))
 		return -1;
-	struct array *kept = array_at(w, w->arrays.n - 1);
+	struct tensor *kept = array_at(w, w->arrays.n - 1);
 	kept->name = strdup(name);
 	kept->digest = file_digest_new();
 	if (!kept->name || !kept->digest)
@@ -157,7 +157,7 @@ static FILE *spool_open(const struct container_writer *w, struct err *e)
 	return f;
 }
 
-static int spool_write(const struct container_writer *w, struct array *a, const void *data,
+static int spool_write(const struct container_writer *w, struct tensor *a, const void *data,
                        size_t bytes, struct err *e)
 {
 	if (!a->spool && !(a->spool = spool_open(w, e)))
@@ -171,7 +171,7 @@ static int spool_write(const struct container_writer *w, struct array *a, const 
 int file_container_write(struct container_writer *w, int array, const void *data, size_t bytes,
                          struct err *e)
 {
-	struct array *a = array_at(w, (size_t)array);
+	struct tensor *a = array_at(w, (size_t)array);
 
 	file_digest_bytes(a->digest, data, bytes);
 	a->bytes += bytes;
@@ -202,7 +202,7 @@ int file_container_put(struct container_writer *w, const char *name, enum dtype 
 /* ---- finishing ---- */
 
 /* Completes an open shape[0] and compares the shape with what was written. */
-static int close_array(struct container_writer *w, struct array *a, struct err *e)
+static int close_array(struct container_writer *w, struct tensor *a, struct err *e)
 {
 	uint64_t row = file_dtype_size(a->type), bytes;
 
@@ -224,7 +224,7 @@ static int close_array(struct container_writer *w, struct array *a, struct err *
 }
 
 /* Describes one array in the header and moves the offset behind it. */
-static int describe(const struct container_writer *w, json_t *header, const struct array *a,
+static int describe(const struct container_writer *w, json_t *header, const struct tensor *a,
                     uint64_t *offset, struct err *e)
 {
 	json_t *shape = json_array();
@@ -291,7 +291,7 @@ static int write_header(struct container_writer *w, struct err *e)
 }
 
 /* Copies an array's spooled bytes, then those still in its buffer. */
-static int write_array(struct container_writer *w, struct array *a, char *block,
+static int write_array(struct container_writer *w, struct tensor *a, char *block,
                        struct err *e)
 {
 	uint64_t left = a->bytes - a->buffer.n;

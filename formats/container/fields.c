@@ -46,7 +46,7 @@ static void *make(const struct field *f, enum field_absent absent, struct err *e
 }
 
 int file_fields_map_or_make(const struct container *c, const struct field_or_not *f, size_t n,
-                            struct vec *made, struct err *e)
+                            struct array *made, struct err *e)
 {
 	for (size_t i = 0; i < n; i++) {
 		const struct field *field = &f[i].field;

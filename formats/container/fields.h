@@ -39,7 +39,7 @@ int file_fields_map(const struct container *c, const struct field *f, size_t n, 
 /* As file_fields_map, but an array that may be absent and is gets made, and added to `made`
  * (void *, for the caller to free). 0, or -1 and e. */
 int file_fields_map_or_make(const struct container *c, const struct field_or_not *f, size_t n,
-                            struct vec *made, struct err *e);
+                            struct array *made, struct err *e);
 
 /* shape[dim] of an array, which must exist with this type and number of
  * dimensions. 0, or -1 and e. */

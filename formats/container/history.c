@@ -10,7 +10,7 @@
 /* What an option of the left-out kind does with the argument after it. */
 enum left_out { KEEP, DROP, DROP_WITH_NEXT };
 
-static int put(struct vec *line, const char *text, size_t n, struct err *e)
+static int put(struct array *line, const char *text, size_t n, struct err *e)
 {
 	return mem_append(line, text, n, 1, e);
 }
@@ -42,7 +42,7 @@ static void base_name(const char *s, const char **begin, size_t *n)
 
 /* Control characters and what is not UTF-8 would break the line or the JSON it
  * goes into: they are written as bash and POSIX.1-2024 $'...' do. */
-static int put_escaped(struct vec *line, const char *s, size_t n, struct err *e)
+static int put_escaped(struct array *line, const char *s, size_t n, struct err *e)
 {
 	char hex[8];
 	int failed = put(line, "$'", 2, e);
@@ -59,7 +59,7 @@ static int put_escaped(struct vec *line, const char *s, size_t n, struct err *e)
 	return failed || put(line, "'", 1, e) ? -1 : 0;
 }
 
-static int put_quoted(struct vec *line, const char *s, size_t n, struct err *e)
+static int put_quoted(struct array *line, const char *s, size_t n, struct err *e)
 {
 	static const char safe[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
 	                           "0123456789_@%+=:,./-";
@@ -82,7 +82,7 @@ static int put_quoted(struct vec *line, const char *s, size_t n, struct err *e)
 }
 
 /* An operand, an option's value, or "--name=value". */
-static int put_argument(struct vec *line, const char *arg, struct err *e)
+static int put_argument(struct array *line, const char *arg, struct err *e)
 {
 	const char *equals = strncmp(arg, "--", 2) == 0 ? strchr(arg, '=') : NULL;
 	const char *begin;
@@ -132,7 +132,7 @@ static enum left_out short_options(const char *arg, const struct history_option 
 	return **rest ? KEEP : DROP;
 }
 
-static int put_command(struct vec *line, int argc, char *const argv[],
+static int put_command(struct array *line, int argc, char *const argv[],
                        const struct history_option *aside, struct err *e)
 {
 	int operands_only = 0;
@@ -167,7 +167,7 @@ static int put_command(struct vec *line, int argc, char *const argv[],
 char *file_history_append(const char *before, int argc, char *const argv[],
                           const struct history_option *aside, struct err *e)
 {
-	struct vec line = { 0 };
+	struct array line = { 0 };
 	size_t n = before ? strlen(before) : 0;
 
 	while (n && before[n - 1] == '\n')

@@ -16,7 +16,7 @@ struct scene {
 	double *world;           /* [nodes][16] */
 	uint8_t *reached;        /* [nodes] */
 	json_t *names;           /* taken */
-	struct vec vertex;       /* double[3] */
+	struct array vertex;     /* double[3] */
 	uint32_t *map, *stamp;   /* [largest accessor] its vertex in the model, valid
 	                            where the stamp is that of the surface */
 	size_t surface, triangle;/* filled so far */

@@ -16,7 +16,7 @@ enum { CHUNK_JSON = 0x4e4f534a, CHUNK_BIN = 0x004e4942 };
 static unsigned char *read_stream(FILE *f, const char *path, size_t known, size_t *bytes,
                                   struct err *e)
 {
-	struct vec v = { 0 };
+	struct array v = { 0 };
 	size_t got;
 
 	if (mem_reserve(&v, known + 1, 1, e))

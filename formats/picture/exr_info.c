@@ -23,7 +23,7 @@ static struct exr_file_string *find(const struct exr_file_info *i, const char *n
 
 static int append(struct exr_file_info *i, char *name, char *value, struct err *e)
 {
-	struct vec v = { i->string, i->strings, i->strings };
+	struct array v = { i->string, i->strings, i->strings };
 	struct exr_file_string s = { name, value };
 	int status = mem_append(&v, &s, 1, sizeof s, e);
 

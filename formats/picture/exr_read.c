@@ -17,7 +17,7 @@ struct input {
 	exr_context_t context;
 	const char *path;
 	int fd;
-	struct vec bytes;        /* the whole file where it cannot be sought in */
+	struct array bytes;      /* the whole file where it cannot be sought in */
 	int64_t size;
 	exr_storage_t storage;
 	exr_attr_box2i_t window; /* data window */

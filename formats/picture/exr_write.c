@@ -21,7 +21,7 @@ struct output {
 	const struct image *im;
 	int half;
 	enum exr_file_compression compression;
-	struct vec bytes;      /* the file so far */
+	struct array bytes;    /* the file so far */
 	float *rows;           /* a chunk of clipped colours, [channels][lines][width] */
 	size_t clipped;
 	struct err *e;

@@ -11,7 +11,7 @@
 
 struct output {
 	const char *path;
-	struct vec bytes; /* the file so far */
+	struct array bytes; /* the file so far */
 	struct err *e;
 };
 

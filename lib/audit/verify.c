@@ -21,8 +21,8 @@ struct pairs {
 	struct patch_matrix pm;
 	const struct ff_scene *scene;
 	uint64_t *start;   /* [sides+1] */
-	struct vec column; /* uint32_t, ascending in a row */
-	struct vec value;  /* double */
+	struct array column; /* uint32_t, ascending in a row */
+	struct array value;  /* double */
 };
 
 /* Entries come ordered by patch-side: equal columns are neighbours. */

@@ -42,29 +42,29 @@ void *mem_new(size_t n, size_t size, const char *what, struct err *e)
 	return p;
 }
 
-int mem_reserve(struct vec *v, size_t more, size_t size, struct err *e)
+int mem_reserve(struct array *a, size_t more, size_t size, struct err *e)
 {
-	if (more <= v->capacity - v->n)
+	if (more <= a->capacity - a->n)
 		return 0;
-	size_t want = v->n + more, cap = v->capacity + v->capacity / 2 + 16;
+	size_t want = a->n + more, cap = a->capacity + a->capacity / 2 + 16;
 	if (cap < want)
 		cap = want;
 	void *p = NULL;
 	if (want >= more && cap <= SIZE_MAX / size)
-		p = realloc(v->data, cap * size);
+		p = realloc(a->data, cap * size);
 	if (!p)
 		return err_set(e, "out of memory: %zu x %zu bytes", cap, size);
-	v->data = p;
-	v->capacity = cap;
+	a->data = p;
+	a->capacity = cap;
 	return 0;
 }
 
-int mem_append(struct vec *v, const void *src, size_t n, size_t size, struct err *e)
+int mem_append(struct array *a, const void *src, size_t n, size_t size, struct err *e)
 {
-	if (mem_reserve(v, n, size, e))
+	if (mem_reserve(a, n, size, e))
 		return -1;
 	if (n)
-		memcpy((char *)v->data + v->n * size, src, n * size);
-	v->n += n;
+		memcpy((char *)a->data + a->n * size, src, n * size);
+	a->n += n;
 	return 0;
 }

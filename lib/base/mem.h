@@ -16,16 +16,16 @@ void mem_keep(void);
  * overflows or memory is short. */
 void *mem_new(size_t n, size_t size, const char *what, struct err *e);
 
-/* A growable array. Begin with {0}; release with free(v.data). */
-struct vec {
+/* A growable array. Begin with {0}; release with free(a.data). */
+struct array {
 	void *data;
 	size_t n, capacity;
 };
 
 /* Makes room for `more` further elements of `size` bytes. 0, or -1 and e. */
-int mem_reserve(struct vec *v, size_t more, size_t size, struct err *e);
+int mem_reserve(struct array *a, size_t more, size_t size, struct err *e);
 
 /* Appends n elements copied from src. 0, or -1 and e. */
-int mem_append(struct vec *v, const void *src, size_t n, size_t size, struct err *e);
+int mem_append(struct array *a, const void *src, size_t n, size_t size, struct err *e);
 
 #endif

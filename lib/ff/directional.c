@@ -89,7 +89,7 @@ static void line_begin(const struct ff_thread *t, uint32_t ps, uint32_t i, uint6
 /* Straight lines `begin` to `end` from a patch-side to a source: those that are clear are
  * appended as captures that weigh what light of the source comes along them. */
 static int probe(struct ff_thread *t, uint32_t ps, uint32_t source, uint32_t begin,
-                 uint32_t end, struct vec *to, struct err *e)
+                 uint32_t end, struct array *to, struct err *e)
 {
 	const struct ff_job *j = t->job;
 	uint64_t seed = rng_mix(j->o.seed ^ (((uint64_t)ps << 32) | source));
@@ -342,7 +342,7 @@ static int add_link(struct ff_thread *t, uint32_t ps, const struct ff_incident *
 static int bin_links(struct ff_thread *t, uint32_t ps, ff_cast_fn *cast, struct ff_batch *b,
                      struct err *e)
 {
-	struct vec all, bin = { 0 };
+	struct array all, bin = { 0 };
 	int bad = 0;
 
 	t->incident.n = 0;

@@ -15,7 +15,7 @@ enum { BAND_BYTES = 192 << 20, ROWS_AT_A_TIME = 64, TILE = 32, REST_RAYS = 256,
 struct thread {
 	struct exchanger x;
 	struct ff_rest rest;
-	struct vec doubt;             /* struct doubt */
+	struct array doubt;           /* struct doubt */
 	struct err e;
 };
 
@@ -37,7 +37,7 @@ struct matrix {
 	struct ff_batch_row *row;        /* [rows] */
 	struct tally_rest *rest;      /* [rows] what of them no side receives */
 	uint8_t *closed;              /* [rows] what leaves the side arrives on sides */
-	struct vec doubt;             /* struct doubt, by pair */
+	struct array doubt;           /* struct doubt, by pair */
 };
 
 static double get(const struct matrix *m, size_t row, size_t j)
@@ -134,7 +134,7 @@ static int gather_doubts(struct matrix *m, struct err *e)
 {
 	m->doubt.n = 0;
 	for (int t = 0; t < m->job->o.threads; t++) {
-		struct vec *v = &m->thread[t].doubt;
+		struct array *v = &m->thread[t].doubt;
 		if (m->thread[t].e.set)
 			return err_set(e, "%s", m->thread[t].e.text);
 		if (mem_append(&m->doubt, v->data, v->n, sizeof(struct doubt), e))

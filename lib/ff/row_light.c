@@ -220,7 +220,7 @@ static uint32_t cast(struct ff_thread *t, size_t light)
 
 /* Makes what comes straight add up to 1 by the values in doubt; light on black backs is
  * among it. */
-static void fit(struct vec *all)
+static void fit(struct array *all)
 {
 	struct lit *lit = all->data;
 	double sure = 0, doubtful = 0;

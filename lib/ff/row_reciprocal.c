@@ -43,8 +43,8 @@ struct gatherer {
 	const struct ff_job *job;
 	struct ff_reciprocal *to;
 	uint32_t **hits;           /* [threads][2P] of the element-side at work */
-	struct vec *met;           /* [threads] uint32_t: patch-sides hit by it */
-	struct vec *pairs;         /* [patches] struct pair, by place */
+	struct array *met;         /* [threads] uint32_t: patch-sides hit by it */
+	struct array *pairs;       /* [patches] struct pair, by place */
 	uint32_t *pairs_of;          /* [2E] pairs of an element-side, by place */
 	struct err *err;           /* [threads] */
 };
@@ -82,7 +82,7 @@ static void cast(struct gatherer *g, uint32_t column, int thread, uint32_t lost[
 
 static void gather_element(struct gatherer *g, uint32_t patch, uint32_t column, int thread)
 {
-	struct vec *met = &g->met[thread];
+	struct array *met = &g->met[thread];
 	uint32_t lost[2] = { 0 }, ps = 2 * patch + (column & 1);
 	double part = g->job->m->element.area[column >> 1] /
 	              (g->job->m->patch.area[patch] * ff_reciprocal_rays(g->job, column >> 1));
@@ -145,7 +145,7 @@ static int transpose(struct gatherer *g, struct err *e)
 				to->seen[to->start[pair->source]++] = (struct ff_receiver_hits){
 					g->job->places.column[place], pair->count };
 		free(g->pairs[p].data);
-		g->pairs[p] = (struct vec){ 0 };
+		g->pairs[p] = (struct array){ 0 };
 	}
 	memmove(to->start + 1, to->start, sides * sizeof *to->start);
 	to->start[0] = 0;

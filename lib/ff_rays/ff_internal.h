@@ -114,8 +114,8 @@ struct ff_thread {
 	const struct ff_job *job;
 	struct tally tally;
 	struct rng rng;
-	struct vec incident;      /* struct ff_incident */
-	struct vec pairs;         /* struct ff_incident */
+	struct array incident;    /* struct ff_incident */
+	struct array pairs;       /* struct ff_incident */
 	int capturing;
 	double capture_weight;    /* of a capture, per weight of the ray */
 	uint32_t lobe_depth;      /* lobes that the row's light is followed through */
@@ -127,12 +127,12 @@ struct ff_thread {
 	uint32_t *item;           /* hemicube: [points][2 sides][pixels] of the patch */
 	struct view *view;        /* hemicube: [points][2 sides] */
 	double rays;
-	struct vec shares;        /* struct ff_share */
-	struct vec lit;           /* struct lit, of the light in work */
+	struct array shares;      /* struct ff_share */
+	struct array lit;         /* struct lit, of the light in work */
 	struct exchanger *formula; /* NULL: nothing is computed by formula */
 	struct ff_ray_batch lobe; /* lobe rays waiting to be cast */
 	uint32_t lobes;
-	struct vec chain_map;     /* local -> whole */
+	struct array chain_map;   /* local -> whole */
 };
 
 #endif

@@ -86,7 +86,7 @@ int ff_batch_put_row(struct ff_batch *b, const struct ff_batch_row *r, struct er
 
 /* ---- the numbers of the whole ---- */
 
-static int map_chain(uint32_t *chain, const struct chains *local, struct vec *map,
+static int map_chain(uint32_t *chain, const struct chains *local, struct array *map,
                      struct chains *whole, struct err *e)
 {
 	const uint32_t none = CHAIN_NONE;
@@ -131,7 +131,7 @@ static int sort_links(struct ff_batch *b, struct err *e)
 	return 0;
 }
 
-int ff_batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *map,
+int ff_batch_renumber(struct ff_batch *b, const struct chains *local, struct array *map,
                       struct chains *whole, struct err *e)
 {
 	for (size_t i = 0; i < b->block_chain.n; i++)
@@ -168,7 +168,7 @@ struct ff ff_batch_view(const struct ff_batch *b)
 
 void ff_batch_free(struct ff_batch *b)
 {
-	struct vec *v[] = { &b->row_side, &b->row_kind, &b->row_samples, &b->row_scale,
+	struct array *v[] = { &b->row_side, &b->row_kind, &b->row_samples, &b->row_scale,
 		&b->row_residual, &b->row_error, &b->row_block, &b->block_chain,
 		&b->block_start, &b->escape, &b->black, &b->lost, &b->cut, &b->block_arrival,
 		&b->column, &b->value, &b->arrival_target, &b->arrival_direction,

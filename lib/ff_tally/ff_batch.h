@@ -10,11 +10,11 @@
 /* Growing arrays of a struct ff. */
 struct ff_batch {
 	int f64;
-	struct vec row_side, row_kind, row_samples, row_scale, row_residual, row_error;
-	struct vec row_block, block_chain, block_start, escape, black, lost, cut;
-	struct vec block_arrival, column, value;
-	struct vec arrival_target, arrival_direction;
-	struct vec link_target, link_source, link_last, link_chain, link_direction, link_row;
+	struct array row_side, row_kind, row_samples, row_scale, row_residual, row_error;
+	struct array row_block, block_chain, block_start, escape, black, lost, cut;
+	struct array block_arrival, column, value;
+	struct array arrival_target, arrival_direction;
+	struct array link_target, link_source, link_last, link_chain, link_direction, link_row;
 };
 
 /* Flux of a chain that reaches no modelled element-side. */
@@ -48,7 +48,7 @@ int ff_batch_put_row(struct ff_batch *b, const struct ff_batch_row *r, struct er
 /* Chain numbers of the batch and order of links: local -> whole. `map` (vec of
  * uint32_t, CHAIN_NONE = not met yet) belongs to the thread whose chains these
  * are. Called in row order, so numbers do not depend on threads. */
-int ff_batch_renumber(struct ff_batch *b, const struct chains *local, struct vec *map,
+int ff_batch_renumber(struct ff_batch *b, const struct chains *local, struct array *map,
                       struct chains *whole, struct err *e);
 
 /* The batch seen as a struct ff (borrowed arrays). */

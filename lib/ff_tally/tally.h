@@ -41,11 +41,11 @@ struct tally {
 	int dependent;             /* samples of a replicate are no independent ones */
 
 	struct tally_chains far;      /* longer chains */
-	struct vec rest;           /* struct ff_tally_rest by slot */
+	struct array rest;         /* struct ff_tally_rest by slot */
 	struct tally_rest spill;   /* takes what comes after running out of memory */
-	struct vec slot_chain;     /* uint32_t chain by slot; slot 0 = chain 0 */
-	struct vec chain_slot;     /* uint32_t 1 + slot by chain, 0 = unused */
-	struct vec arrival;        /* struct tally_arrival */
+	struct array slot_chain;   /* uint32_t chain by slot; slot 0 = chain 0 */
+	struct array chain_slot;   /* uint32_t 1 + slot by chain, 0 = unused */
+	struct array arrival;      /* struct tally_arrival */
 	struct err err;            /* out of memory, checked once a row */
 };
 

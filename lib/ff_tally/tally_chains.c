@@ -39,7 +39,7 @@ static int sort_far(struct tally_chains *f, struct err *e)
 		to = swap;
 	}
 	if (from != f->list.data) {
-		struct vec swap = f->list;
+		struct array swap = f->list;
 		f->list = f->sort;
 		f->list.n = n;
 		f->sort = swap;

@@ -14,8 +14,8 @@ struct tally_landing {
 };
 
 struct tally_chains {
-	struct vec list;           /* struct tally_landing */
-	struct vec sort;           /* scratch for sorting them */
+	struct array list;         /* struct tally_landing */
+	struct array sort;         /* scratch for sorting them */
 	size_t most;               /* when to add up equal ones */
 };
 

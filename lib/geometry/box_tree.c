@@ -127,7 +127,7 @@ void geo_boxes_free(struct boxes *b)
 }
 
 int geo_boxes_find(const struct boxes *b, const struct box *near, double margin,
-                   struct vec *found, struct err *e)
+                   struct array *found, struct err *e)
 {
 	struct box wide = *near;
 

@@ -35,6 +35,6 @@ void geo_boxes_free(struct boxes *b);
 /* Appends (uint32_t) the triangles whose boxes come within `margin` of `near`.
  * O(log n + found) for well-shaped triangles. 0, or -1 and e. */
 int geo_boxes_find(const struct boxes *b, const struct box *near, double margin,
-                   struct vec *found, struct err *e);
+                   struct array *found, struct err *e);
 
 #endif

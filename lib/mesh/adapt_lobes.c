@@ -38,7 +38,7 @@ static double mean_square(const double *x, int bands)
 }
 
 /* Appends the patch-side if it has a lobe of finite exponent. */
-static int add_shiny(const struct model *m, uint32_t ps, struct vec *list, struct err *e)
+static int add_shiny(const struct model *m, uint32_t ps, struct array *list, struct err *e)
 {
 	const struct materials *mt = &m->material;
 	uint32_t material = model_patch_material(m, ps >> 1);
@@ -90,7 +90,7 @@ static double find_deviations(const struct model *m, const struct solution *s,
 int mesh_lobe_energies(const struct model *m, const struct solution *s,
                        const struct patch_frame *frame, double *energy, struct err *e)
 {
-	struct vec list = { 0 };
+	struct array list = { 0 };
 	double *deviation = mem_new(2 * m->patch.n, sizeof *deviation, "patches", e);
 	int status = deviation ? 0 : -1;
 

@@ -23,7 +23,7 @@ struct search {
 	double *corner;       /* [2 patches][3] of boxes */
 	uint32_t *triangle;   /* [patches][3] that have these boxes */
 	const struct patch_frame *frame;
-	struct vec found;
+	struct array found;
 	struct err *e;
 };
 

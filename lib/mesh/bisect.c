@@ -34,7 +34,7 @@ struct side {
 
 struct work {
 	struct model *m;
-	struct vec vertex, leaf, side, split, heap;
+	struct array vertex, leaf, side, split, heap;
 	double limit;          /* squared */
 	struct err *e;
 };

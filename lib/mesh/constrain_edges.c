@@ -258,7 +258,7 @@ static int draw_line(struct triangulation *c, uint32_t u, uint32_t v)
 /* ---- all of it ---- */
 
 static int cut_triangle(struct triangulation *c, const struct contact *contact, size_t n,
-                        struct vec *ends)
+                        struct array *ends)
 {
 	uint32_t vertex;
 
@@ -340,7 +340,7 @@ int mesh_constrain_edges(const struct model *m, const struct half_edges *g, cons
 {
 	struct triangulation c = { .m = m, .g = g, .p = p, .apart = limits->apart, .e = e };
 	const struct contact *list = contacts->list.data;
-	struct vec ends = { 0 };
+	struct array ends = { 0 };
 	size_t n = contacts->list.n;
 	int status = begin(&c);
 

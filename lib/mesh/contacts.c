@@ -16,7 +16,7 @@ struct search {
 	double (*normal)[3];      /* [triangles] unit */
 	uint32_t *plane;          /* [triangles] sets of coplanar neighbours */
 	struct boxes boxes;
-	struct vec near, cut;
+	struct array near, cut;
 	struct contacts *out;
 	struct err *e;
 };

@@ -17,7 +17,7 @@ struct search {
 	const struct imprint_limits *limits;
 	double *area;             /* [surfaces] */
 	struct boxes boxes;
-	struct vec near;          /* uint32_t, triangles about the one looked at */
+	struct array near;        /* uint32_t, triangles about the one looked at */
 };
 
 static const double *corner(const struct model *m, size_t triangle, int k)

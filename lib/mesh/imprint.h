@@ -26,7 +26,7 @@ struct contact {
 };
 
 struct contacts {
-	struct vec list;  /* struct contact, by triangle */
+	struct array list;  /* struct contact, by triangle */
 	size_t fine;      /* left out for being too short */
 };
 
@@ -50,8 +50,8 @@ struct piece {
 #define RIM UINT32_MAX
 
 struct pieces {
-	struct vec vertex;    /* double[3] */
-	struct vec piece;     /* the first m->triangles are the first parts of each */
+	struct array vertex;  /* double[3] */
+	struct array piece;   /* the first m->triangles are the first parts of each */
 	size_t cut;           /* input triangles with contacts */
 };
 

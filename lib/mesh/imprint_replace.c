@@ -57,7 +57,7 @@ static size_t join_corners(const struct parts *parts, const struct half_edges *g
 }
 
 /* The first set of corners at a vertex keeps it, each further one gets a copy. */
-static int copy_vertices(struct parts *parts, struct vec *vertex, uint32_t *set,
+static int copy_vertices(struct parts *parts, struct array *vertex, uint32_t *set,
                          const uint8_t *on_line, size_t vertices, struct err *e)
 {
 	int status = -1;
@@ -174,7 +174,7 @@ int mesh_imprint_replace(struct model *m, struct pieces *p, size_t *lines, struc
 	free(m->vertex);
 	m->vertex = p->vertex.data;
 	m->vertices = p->vertex.n;
-	p->vertex = (struct vec){ 0 };
+	p->vertex = (struct array){ 0 };
 	status = 0;
 done:
 	free(parts.piece);

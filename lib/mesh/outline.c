@@ -23,11 +23,11 @@ struct loop {
 struct tracer {
 	struct model *m;
 	struct err *e;
-	struct vec arc;     /* sorted by from, to */
-	struct vec done;    /* [half-edges] 1: traced */
-	struct vec corner;  /* vertices of the loops found in this patch */
-	struct vec loop;    /* these loops */
-	struct vec start, index; /* what becomes loop_start and loop_index */
+	struct array arc;   /* sorted by from, to */
+	struct array done;  /* [half-edges] 1: traced */
+	struct array corner;  /* vertices of the loops found in this patch */
+	struct array loop;  /* these loops */
+	struct array start, index; /* what becomes loop_start and loop_index */
 	const uint32_t *element; /* corners of the patch's elements */
 	double normal[3];
 };

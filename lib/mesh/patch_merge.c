@@ -42,7 +42,7 @@ struct merger {
 	uint32_t *patch;         /* [elements] the group */
 	uint32_t *next;          /* [elements] lists of groups */
 	struct group *group;
-	struct vec heap, border;
+	struct array heap, border;
 	struct err *e;
 };
 

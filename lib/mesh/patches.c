@@ -26,7 +26,7 @@ struct divider {
 	uint32_t *label;         /* [elements] the piece being divided */
 	uint32_t *edge_label;    /* [edges] the search that has passed */
 	uint32_t labels;
-	struct vec todo;
+	struct array todo;
 	struct err *e;
 };
 

@@ -15,7 +15,7 @@ struct triangulation {
 	uint32_t triangle;    /* being cut, and its frame */
 	const double *origin;
 	double axis[2][3];
-	struct vec crossed;   /* half-edges in the way of a line */
+	struct array crossed; /* half-edges in the way of a line */
 	struct err *e;
 };
 

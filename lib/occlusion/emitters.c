@@ -13,7 +13,7 @@ enum { AT_ONCE = 8 };  /* corners of a facet; larger polygons are cut into fans 
 struct maker {
 	const struct model *m;
 	double shift[3];              /* from corners of polygons to those of facets */
-	struct vec emitter, corner;
+	struct array emitter, corner;
 	struct err *e;
 };
 

@@ -180,7 +180,7 @@ static int dark(const struct integral *in, const struct cell *c, const struct fa
 /* Replaces a cell by its parts. */
 static int refine(struct integral *in, size_t i)
 {
-	struct vec *cells = &in->o->cell;
+	struct array *cells = &in->o->cell;
 	struct cell c = ((struct cell *)cells->data)[i], part[4];
 	struct facet_room room[4];
 	double before = in->settled, area = c.shape.f.area, sum = 0;

@@ -12,7 +12,7 @@
 struct occluded {
 	struct visible_point visible;
 	int blockers;
-	struct vec cell;              /* struct cell */
+	struct array cell;            /* struct cell */
 };
 
 void occ_occluded_free(struct occluded *o);

@@ -25,7 +25,7 @@ enum { KEEP_ALL = 1 << 15, KEEP_OF_MANY = 2 };
 struct maker {
 	const struct model *m;
 	double centre[3];
-	struct vec facet, corner;
+	struct array facet, corner;
 	struct err *e;
 };
 

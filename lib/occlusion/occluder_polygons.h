@@ -14,7 +14,7 @@ struct polygon {
 struct polygons {
 	double *point;                /* [points][3] distinct corners */
 	size_t points;
-	struct vec polygon, corner;   /* struct polygon; uint32_t points */
+	struct array polygon, corner; /* struct polygon; uint32_t points */
 	double near;                  /* see occluder_set */
 };
 

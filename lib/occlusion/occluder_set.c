@@ -19,7 +19,7 @@ struct maker {
 	uint32_t *order;              /* polygons by group */
 	uint32_t *first_side;         /* [polygons+1] edges by group of their polygon */
 	struct side *group_side;
-	struct vec body, corner, edge, face;
+	struct array body, corner, edge, face;
 	struct err *e;
 };
 

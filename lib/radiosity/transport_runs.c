@@ -245,7 +245,7 @@ static void fill_rows(void *arg, size_t begin, size_t end, int thread)
 /* ---- what is followed on ---- */
 
 /* Adds what a run sends on by one event to the block's list from `first` on. */
-static int add_onward(struct vec *list, size_t first, struct onward x, struct err *e)
+static int add_onward(struct array *list, size_t first, struct onward x, struct err *e)
 {
 	struct onward *o = list->data;
 
@@ -262,7 +262,7 @@ static int list_onward(struct transport *t, struct err *e)
 {
 	const struct chains *c = &t->chains;
 	const uint32_t *all = c->child.data;
-	struct vec list = { 0 };
+	struct array list = { 0 };
 	int bad = 0;
 
 	for (size_t b = 0; b < t->blocks; b++) {

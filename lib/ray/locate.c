@@ -36,7 +36,7 @@ static void halve(struct locator_node *n, const struct split *s, int second)
 
 /* The functions of every node below a triangle's root. Children follow parents in no
  * special order, so a stack of nodes to visit is kept. */
-static int fill_nodes(struct locator *l, struct vec *stack, uint32_t tri, struct err *e)
+static int fill_nodes(struct locator *l, struct array *stack, uint32_t tri, struct err *e)
 {
 	int32_t at = l->m->triangle.split[tri];
 
@@ -129,7 +129,7 @@ static void fill_square(const struct locator *l, int32_t *cell, int32_t at, stru
 
 static int fill(struct locator *l, struct err *e)
 {
-	struct vec stack = { 0 };
+	struct array stack = { 0 };
 	int bad = 0;
 
 	for (uint32_t t = 0; !bad && t < l->m->triangle.n; t++) {

@@ -31,7 +31,7 @@ static void extend(struct mirror_plane *plane, const double x[3])
 	}
 }
 
-static int add_plane(const struct model *m, struct mirrors *k, struct vec *list,
+static int add_plane(const struct model *m, struct mirrors *k, struct array *list,
                      size_t triangle, int side, struct err *e)
 {
 	const uint32_t *c = &m->triangle.corner[3 * triangle];
@@ -60,7 +60,7 @@ static int add_plane(const struct model *m, struct mirrors *k, struct vec *list,
 
 int ray_mirrors_find(const struct model *m, struct mirrors *k, struct err *e)
 {
-	struct vec list = { 0 };
+	struct array list = { 0 };
 	double size[3];
 	int bad = 0;
 
@@ -137,7 +137,7 @@ static double turn(const struct model *m, const struct mirrors *k, const struct 
 	return most;
 }
 
-static int list_lights(const struct model *m, struct vec *list, struct err *e)
+static int list_lights(const struct model *m, struct array *list, struct err *e)
 {
 	for (uint32_t i = 0; i < m->light.n; i++) {
 		struct image new = { .origin = i, .parent = i, .plane = -1 };
@@ -153,7 +153,7 @@ static int list_lights(const struct model *m, struct vec *list, struct err *e)
 
 /* Images of images until none carries anything, or there are enough. */
 static int list_images(const struct model *m, double clear, int orders, size_t most,
-                       double least, struct light_images *g, struct vec *list, struct err *e)
+                       double least, struct light_images *g, struct array *list, struct err *e)
 {
 	size_t begin = 0, end = list->n;
 	struct image new;
@@ -213,7 +213,7 @@ static void fill(const struct model *m, const struct image *list, struct light_i
 int ray_light_images_new(const struct model *m, double clear, int orders, size_t most,
                          double least, struct light_images *g, struct err *e)
 {
-	struct vec list = { 0 };
+	struct array list = { 0 };
 
 	*g = (struct light_images){ 0 };
 	int bad = (m->light.n && ray_mirrors_find(m, &g->mirrors, e)) || list_lights(m, &list, e) ||

@@ -59,7 +59,7 @@ static double list_lights(struct pathtrace *p)
 
 static int list_emitters(struct pathtrace *p, struct err *e)
 {
-	struct vec list = { 0 };
+	struct array list = { 0 };
 	double total = 0, lights = list_lights(p);
 
 	for (size_t i = 0; i < 2 * p->m->triangle.n; i++) {

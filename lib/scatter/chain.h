@@ -25,9 +25,9 @@ struct chains {
 	uint32_t *most;         /* [events] where the count stops */
 	uint8_t *finite;        /* [events] a lobe of finite exponent */
 	uint32_t *slot;         /* [4 materials] event id -> index, or CHAIN_NONE */
-	struct vec count;       /* uint32_t [n][events] */
-	struct vec child;       /* uint32_t [n][events], CHAIN_NONE = not made yet */
-	struct vec length;      /* uint32_t [n] total count */
+	struct array count;     /* uint32_t [n][events] */
+	struct array child;     /* uint32_t [n][events], CHAIN_NONE = not made yet */
+	struct array length;    /* uint32_t [n] total count */
 	size_t n;
 	uint32_t *hash;         /* open addressing, CHAIN_NONE = free */
 	size_t hash_size;

@@ -23,7 +23,7 @@ void view_shade_tile_free(struct view_shade_tile *s)
 }
 
 /* Puts the last request of `of` in the order of element-sides. */
-static void put_order(struct view_shade_tile *s, struct vec *order, const struct vec *of,
+static void put_order(struct view_shade_tile *s, struct array *order, const struct array *of,
                       uint32_t element, int side)
 {
 	uint64_t key = (2 * (uint64_t)element + (uint64_t)side) << 31 | (of->n - 1);

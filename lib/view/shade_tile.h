@@ -37,11 +37,11 @@ struct view_shade_tile {
 	struct direct_worker *direct;
 	struct gather *gather;      /* NULL: indirect light is interpolated */
 	int thread, asking;         /* asking: points are told to gather, not shaded */
-	struct vec request;         /* struct view_request */
-	struct vec weight;          /* double [bands] for each */
-	struct vec order;           /* uint64_t: element-side that light arrives on, request */
-	struct vec lobe;            /* struct view_lobe_request */
-	struct vec lobe_order;      /* as order */
+	struct array request;       /* struct view_request */
+	struct array weight;        /* double [bands] for each */
+	struct array order;         /* uint64_t: element-side that light arrives on, request */
+	struct array lobe;          /* struct view_lobe_request */
+	struct array lobe_order;    /* as order */
 	struct err e;               /* the first failure */
 };
 

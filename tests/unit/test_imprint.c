@@ -463,7 +463,7 @@ static void test_boxes(void **state)
 		double vertex[3 * MANY][3];
 		uint32_t triangle[3 * MANY];
 		struct boxes b;
-		struct vec found = { 0 };
+		struct array found = { 0 };
 		struct err e = { 0 };
 		for (uint32_t i = 0; i < 3 * n; i++) {
 			random_vector(&random, 1, vertex[i]);
