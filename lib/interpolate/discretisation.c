@@ -8,6 +8,7 @@
 #include "lib/base/mem.h"
 #include "lib/base/parallel.h"
 #include "lib/base/vec3.h"
+#include "lib/data/solution.h"
 #include "lib/interpolate/smooth_groups.h"
 
 /* As in interpolation: cos 30 degrees. */

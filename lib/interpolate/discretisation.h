@@ -15,7 +15,8 @@
 #define TWOPASS_DISCRETISATION_H
 
 #include "lib/data/model.h"
-#include "lib/data/solution.h"
+
+struct solution;
 
 /* Scales standard errors, of each part all alike, down to what most elements differ by from
  * their neighbours, if that is less (not where the elements of each patch share a value,

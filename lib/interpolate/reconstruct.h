@@ -21,7 +21,8 @@
 
 #include "lib/base/err.h"
 #include "lib/data/model.h"
-#include "lib/data/solution.h"
+
+struct solution;
 
 struct reconstruction {
 	size_t elements;

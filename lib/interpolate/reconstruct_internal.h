@@ -8,7 +8,6 @@
 #include "lib/base/channels.h"
 #include "lib/base/constants.h"
 #include "lib/data/model.h"
-#include "lib/data/solution.h"
 #include "lib/interpolate/reconstruct.h"
 #include "lib/interpolate/smooth_groups.h"
 

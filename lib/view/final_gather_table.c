@@ -5,6 +5,7 @@
 #include "lib/base/mem.h"
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
+#include "lib/data/solution.h"
 
 /* A side is rough where interpolation misses so much of its irradiance. */
 static const double rough_from = .02;

@@ -13,7 +13,6 @@
 #include "lib/base/err.h"
 #include "lib/base/parallel.h"
 #include "lib/data/model.h"
-#include "lib/data/solution.h"
 #include "lib/picture/camera.h"
 #include "lib/picture/image.h"
 #include "lib/ray/ray.h"
@@ -63,6 +62,7 @@ struct view_stats {
 	                      nor nothing */
 };
 
+struct solution;
 struct view_scene;
 
 /* What all views share: tables of materials, interpolated irradiance, the brightest

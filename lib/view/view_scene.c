@@ -5,6 +5,7 @@
 
 #include "lib/base/constants.h"
 #include "lib/base/mem.h"
+#include "lib/data/solution.h"
 #include "lib/interpolate/discretisation.h"
 
 static void make_lobe(struct view_lobe *lobe, const double *coefficient, int bands, double k)
