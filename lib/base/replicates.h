@@ -37,12 +37,13 @@ static inline double replicates_error(struct replicates r, int n)
 	return sqrt(r.squares / (n * (n - 1)));
 }
 
-/* Sums of four parts as those of two parts of twice the length, with room for two more. */
-static inline void replicates_halve(double *first, double *second, double *third, double *fourth)
+/* Makes REPLICATES sums those of half as many parts, twice as long; the others begin at 0. */
+static inline void replicates_halve(double *x, size_t stride)
 {
-	*first += *second;
-	*second = *third + *fourth;
-	*third = *fourth = 0;
+	for (size_t i = 0; i < REPLICATES / 2; i++)
+		x[i * stride] = x[2 * i * stride] + x[(2 * i + 1) * stride];
+	for (size_t i = REPLICATES / 2; i < REPLICATES; i++)
+		x[i * stride] = 0;
 }
 
 #endif

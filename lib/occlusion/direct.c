@@ -19,7 +19,7 @@
 /* Limits of the formula, counts. Both are guesses; trace(1) tells users of them, and the table of
  * README.md (tests/bench/report) what formula and shadow rays cost. */
 enum {
-	EXACT_MOST = 48,     /* emitters: each is looked at for each side, so of more all are sampled */
+	EXACT_MOST = 48,     /* emitters: each is looked at for each side; of more all are sampled */
 	OCCLUDERS_MOST = 16  /* between a side and one of them: each is clipped off at every point,
 	                        and beyond, rays cost less */
 };

@@ -1,11 +1,12 @@
-/* Irradiance that comes straight from emitters and punctual lights, at points where a picture needs it.
+/* Irradiance that comes straight from emitters and punctual lights, at points where a picture
+ * needs it.
  *
  * What a point sees of an emitter's polygon past the convex occluders between is found by
  * clipping, and its irradiance by Lambert's formula: exact, without noise. Emitters that
  * more occluders stand before than that pays for, and scenes of many emitters, are sampled
  * by shadow rays instead, which come with a standard error. A punctual light takes one
- * shadow ray and has no error. Light through mirrors and
- * panes is not direct: everything hides what is behind it. */
+ * shadow ray and has no error. Light through mirrors and panes is not direct: everything hides
+ * what is behind it. */
 #ifndef TWOPASS_DIRECT_H
 #define TWOPASS_DIRECT_H
 

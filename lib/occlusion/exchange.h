@@ -12,7 +12,7 @@ struct exchange_options {
 	double relative;      /* error of what nothing hides, relative */
 	double absolute;      /* error of a form factor, of either facet, that is partly hidden */
 	int most;             /* evaluations spent on one such */
-	int occluders;           /* between two facets, beyond which it is a crowd */
+	int occluders;        /* between two facets, beyond which it is a crowd */
 	int crowd_rays;       /* spent on one with a crowd between; 0: it is left at 0 */
 };
 

@@ -5,7 +5,11 @@
 #include "lib/geometry/facet.h"
 #include "lib/occlusion/occluder_set.h"
 
-enum { OCCLUDER_EDGES = OCCLUDER_SHAPE_EDGES + OCCLUDER_SHAPE_FACES, OCCLUDER_CORNERS = OCCLUDER_EDGES };
+/* Where a plane cuts an occluder, each of its faces gets one edge more. */
+enum {
+	OCCLUDER_EDGES = OCCLUDER_SHAPE_EDGES + OCCLUDER_SHAPE_FACES,
+	OCCLUDER_CORNERS = OCCLUDER_EDGES
+};
 
 /* An occluder, or what of it is in front of a facet. */
 struct occluder {

@@ -13,7 +13,9 @@
 #include "lib/base/err.h"
 #include "lib/data/model.h"
 
-/* The most that an occluder may have: its silhouette then has at most 32 edges. */
+/* The most that an occluder may have, counts; what has more stays apart as its faces, or as its
+ * triangles. At three edges a corner, 48 edges have 32 corners, so no silhouette has more
+ * edges. That takes in furniture and frames, while a ball is left to rays: a guess. */
 enum { OCCLUDER_SHAPE_EDGES = 48, OCCLUDER_SHAPE_FACES = 32, FLAT_CORNERS = 32 };
 
 struct plane {
@@ -27,6 +29,7 @@ struct occluder_edge {
 	double along[3];              /* unit vector from a to b */
 };
 
+/* A convex occluder as a whole. */
 struct occluder_shape {
 	uint32_t corner, corners;     /* first and number in occluder_set.corner */
 	uint32_t edge, edges;
@@ -44,7 +47,7 @@ struct occluder_node {
 /* Corners are relative to occ_facet_centre(). */
 struct occluder_set {
 	size_t occluders, corners, edges, faces, nodes;
-	struct occluder_shape *occluder;            /* ordered as the leaves of the tree */
+	struct occluder_shape *occluder; /* ordered as the leaves of the tree */
 	double *corner;               /* [corners][3] */
 	struct occluder_edge *edge;
 	struct plane *face;           /* outward normals of solids */
@@ -52,7 +55,8 @@ struct occluder_set {
 	double near;                  /* heights up to this count as on a plane, m */
 };
 
-/* O(n log n) in triangles, and O(corners) for each plane on the hull and each solid. 0, or -1 and e. */
+/* O(n log n) in triangles, and O(corners) for each plane on the hull and each solid. 0, or -1
+ * and e. */
 int occ_occluder_set_init(struct occluder_set *s, const struct model *m, struct err *e);
 void occ_occluder_set_free(struct occluder_set *s);
 

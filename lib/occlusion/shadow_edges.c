@@ -5,9 +5,15 @@
 #include "lib/base/vec3.h"
 #include "lib/occlusion/occluder_polygons.h"
 
-/* Up to how many occluders it pays to look for bends, and where the shadows of two meet:
- * the cells between many are small anyway. */
+/* Up to how many occluders it pays to look for bends, and where the shadows of two meet, a count:
+ * the cells between many are small anyway. A guess. */
 enum { FEW = 3 };
+
+/* Two planes are one if the cosine between them is as near to 1: 1e-6 radians. */
+static const double same_plane = 1e-12;
+
+/* The same of two edges that are parallel. */
+static const double same_direction = 5e-13;
 
 /* ---- cuts ---- */
 
@@ -39,7 +45,7 @@ static int occluder_side(const struct occluder *b, const struct plane *p, double
 static void add(const struct cuts *c, struct shadow_cuts *s, const struct plane *p, uint64_t of)
 {
 	for (int i = 0; i < s->n; i++)
-		if (fabs(fabs(v3_dot(s->cut[i].normal, p->normal)) - 1) < 1e-12 &&
+		if (fabs(fabs(v3_dot(s->cut[i].normal, p->normal)) - 1) < same_plane &&
 		    fabs(fabs(s->cut[i].offset) - fabs(p->offset)) < c->near) {
 			s->of[i] |= of;
 			return;
@@ -107,7 +113,7 @@ static int plane_through(const double a[3], const double along[3], const double 
 /* Of unit vectors. */
 static int parallel(const double a[3], const double b[3])
 {
-	return fabs(v3_dot(a, b)) >= 1 - 5e-13;
+	return fabs(v3_dot(a, b)) >= 1 - same_direction;
 }
 
 /* Bits of an occluder's faces that a point is surely in front of, and behind. */

@@ -4,6 +4,8 @@
 
 #include "lib/occlusion/shaft.h"
 
+/* Counts. Cuts: as many as a cell has bits for them; further ones are left to the halving of cells.
+ * Limits: further occluders are not ruled out early. 96 is a guess. */
 enum { SHADOW_CUTS = 32, SHADOW_LIMITS = 96 };
 
 struct shadow_cuts {

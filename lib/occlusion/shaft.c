@@ -6,6 +6,9 @@
 #include "lib/base/vec3.h"
 #include "lib/occlusion/occluder_polygons.h"
 
+/* A box is flat up to so many times the height that counts as none. A guess. */
+static const double flat_box = 4;
+
 /* ---- the shaft between two facets ---- */
 
 static void grow_box(struct shaft *l, const struct facet *f)
@@ -67,7 +70,7 @@ int occ_shaft_planes(const struct facet *f, const struct facet *g, double near,
 
 /* ---- occluders in it ---- */
 
-/* Can nothing of an occluder be between? All of it on or behind a facet's plane. */
+/* Is all of an occluder on or behind a facet's plane, so that it hides nothing? */
 static int behind_facet(const struct occluder_set *s, const struct occluder_shape *b, const struct facet *f)
 {
 	const double *x = &s->corner[3 * (size_t)b->corner];
@@ -111,7 +114,7 @@ static int apart(const struct shaft *l, const double lo[3], const double hi[3])
 			/* A flat box may lie in the shaft's flat box. */
 			if (lo[k] > l->hi[k] + near || hi[k] < l->lo[k] - near)
 				return 1;
-			if (l->hi[k] - l->lo[k] > 4 * near)
+			if (l->hi[k] - l->lo[k] > flat_box * near)
 				return 1;
 		}
 	return 0;
@@ -146,7 +149,7 @@ static int box_outside(const struct shaft *l, const double lo[3], const double h
 static int collect(struct shaft *l)
 {
 	const struct occluder_set *s = l->set;
-	uint32_t stack[64], depth = 0;
+	uint32_t stack[64], depth = 0; /* the tree halves: 33 wait at most */
 
 	if (s->nodes)
 		stack[depth++] = 0;

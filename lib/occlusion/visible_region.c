@@ -5,12 +5,18 @@
 #include "lib/base/vec3.h"
 #include "lib/occlusion/occluder_polygons.h"
 
-/* Up to how many occluders that hide parts of a polygon what they hide is taken off, and
- * what they hide together added again; else it is cut up. Only where the measure is exact. */
+/* Up to how many occluders that hide parts of a polygon what they hide is taken off, and what they
+ * hide together added again (2^n - 1 measures); else it is cut up. A count, a guess. Only
+ * where the measure is exact. */
 enum { OVERLAPS = 3 };
 
-/* Heights are rounded to this, by the size of what is multiplied. What is seen, too. */
+/* Heights are rounded to this, by the size of what is multiplied; what is visible, too. Some
+ * fifty roundings of 2e-16. */
 static const double rounding = 1e-14;
+
+/* An eye is in front of a face from this part of `near` on: behind it by rounding is not in the
+ * solid. A guess. */
+static const double in_front_from = 1e-6;
 
 void occ_visible_begin(struct visible_point *s, int occluders, double near)
 {
@@ -31,7 +37,7 @@ static uint64_t faces_in_front(const struct occluder *b, const double x[3], doub
 		return h > 0 ? 1 : h < 0 ? 2 : 0;
 	}
 	for (int i = 0; i < b->faces; i++)
-		front |= (uint64_t)(occ_plane_height(&b->face[i], x) > near * 1e-6) << i;
+		front |= (uint64_t)(occ_plane_height(&b->face[i], x) > near * in_front_from) << i;
 	return front;
 }
 

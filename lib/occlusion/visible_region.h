@@ -6,6 +6,7 @@
 #include "lib/geometry/point_polygon.h"
 #include "lib/occlusion/shaft.h"
 
+/* A count: 32 of the silhouette of a whole occluder, and as many where a plane cuts it. */
 enum { OUTLINE_EDGES = 64 };
 
 /* The silhouette of an occluder for all eyes that have the same of its faces in front. */
@@ -28,8 +29,8 @@ typedef double (*visible_measure)(const struct point_polygon *p, void *arg);
 /* One thread's scratch space and the occluders. */
 struct visible_point {
 	struct occluder occluder[SHAFT_OCCLUDERS];
-	double near;                  /* of the occluder set */
-	int occluded;                      /* set when an occluder hides something */
+	double near;                  /* of the set of occluders */
+	int occluded;                 /* set when an occluder hides something */
 	double evaluations;           /* so far */
 	/* The eye in work. */
 	double reach;                 /* of the farthest corner of what is looked at */
