@@ -16,7 +16,7 @@ enum {
 	                               and what takes a point 20 ms at 3 million rays a second */
 	CELLS = 8,                  /* squared, that rays are sorted into by direction, and */
 	AT_ONCE = 512,              /* sorted at a time: eight for each cell, exactly, when they are
-	                               aligned, as many as a packet of AVX lanes has */
+	                               aligned, as many as a packet of rays has */
 	ERRORS = 8                  /* of so many one is asked for the error of the solution: an
 	                               eighth of its cost, and it need not be known well */
 };

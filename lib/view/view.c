@@ -27,7 +27,7 @@ enum { SUMS = 7 };  /* arrays of view_sums */
  * noise that one may see, at five to ten times the cost of none (trace(1), README.md). A guess. */
 static const double usual_error = .1;
 
-/* The same of samples of a lobe: what it shows is less blurred by eye than direct light. A guess. */
+/* The same of samples of a lobe. A guess. */
 static const double usual_lobe_error = .05;
 
 /* Variance of the mean of n samples that are stratified over a pixel over that of samples

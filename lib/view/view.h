@@ -1,6 +1,6 @@
 /* The view-dependent pass: pictures of a solved scene.
  *
- * The radiance that point j sends to the eye is equation (1) of Nishitani and Kono, A Two-Pass
+ * The radiance that point j sends to the eye is equation (1) of Nishitani and Nono, A Two-Pass
  * Solution to the Global Illumination Model, as radiance:
  *
  *     L(j, eye) = L_e(j, eye)                                 emission            [KE term]
@@ -60,7 +60,7 @@ struct view_options {
 };
 
 /* Guesses, but README.md has what samples and gathering rays cost and bring (tests/bench/report).
- * Depth 32: a mirror of .8 leaves a thousandth, which is the cutoff. */
+ * Depth 32: what mirrors of .8 leave is then below the cutoff. */
 #define VIEW_OPTIONS_DEFAULT \
 	((struct view_options){ .samples = 4, .lobe_samples = VIEW_LOBE_ENOUGH, .depth = 32, \
 	                        .cutoff = 1e-3, .gather_rays = 1024 })
