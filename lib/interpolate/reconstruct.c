@@ -143,8 +143,8 @@ static void add_part(struct reconstruct_job *j, const double *part, size_t colum
 		}
 }
 
-/* Of an exact value the largest that squares of float32 keep finite: what differs from it is not
- * consistent with it. */
+/* 1 over a variance; of an exact value nearly the largest number there is, so that what differs
+ * from it is not consistent with it. */
 static double precision_of(double variance)
 {
 	static const double exact = 1e300;

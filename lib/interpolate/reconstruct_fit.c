@@ -6,8 +6,8 @@
 #include "lib/base/vec3.h"
 
 /* A fit is used if its variance at the vertex is at most this many times the variance of one
- * element: inside a surface it is a sixth, at borders about one, and at corners, where a
- * function is drawn out beyond few elements, several. A guess. */
+ * element: a sixth inside a regular grid, more where a function is drawn out beyond few
+ * elements, as at corners of a surface. A guess. */
 static const double accepted_variance = 1.5;
 
 /* A fit needs positions whose covariance has a determinant above this part of its trace squared:

@@ -13,9 +13,8 @@
 
 /* Counts; guesses. */
 enum {
-	RINGS = 3,      /* of neighbours that a fit may reach: the third fixes a function at any corner
-	                   of a grid */
-	NEAR_MAX = 96,  /* elements that one of them may add: three times those of a regular grid's third */
+	RINGS = 3,      /* of elements that a fit may reach */
+	NEAR_MAX = 96,  /* elements that one of them may add: three times the third of a regular grid */
 	SEEN_MAX = 4096 /* corners that may be looked at for it: bounds the time of a fan of slivers */
 };
 
