@@ -93,7 +93,7 @@ static void do_span(struct matrix *m, struct thread *t, size_t r, size_t begin, 
 			}
 			set(m, r, j + k, x[k]);
 			t->x.counts.pairs += x[k] > 0;
-			t->x.counts.clear += x[k] > 0;
+			t->x.counts.unoccluded += x[k] > 0;
 		}
 	}
 }
@@ -353,7 +353,7 @@ static int tabulate(struct matrix *m, double relative, struct err *e)
 
 	for (size_t i = 0; simple && i < m->n; i++)
 		simple = start[m->side[i]] == i && start[m->side[i] + 1] == i + 1;
-	return simple ? geo_pair_table_new(m->facets.facet, m->facets.joint, m->n, relative, m->bodies.near,
+	return simple ? geo_pair_table_new(m->facets.facet, m->facets.pair, m->n, relative, m->bodies.near,
 	                                   &m->table, e) : 0;
 }
 
@@ -371,7 +371,7 @@ static int matrix_init(struct matrix *m, const struct ff_job *j, struct err *e)
 {
 	const struct exchange_options o = { .relative = j->o.f64 ? 1e-9 : 8e-7,
 	                                    .absolute = j->o.target, .most = j->o.evaluations,
-	                                    .bodies = SHAFT_OCCLUDERS, .crowd_rays = CROWD_RAYS };
+	                                    .occluders = SHAFT_OCCLUDERS, .crowd_rays = CROWD_RAYS };
 
 	*m = (struct matrix){ .job = j };
 	if (find_sides(m, e) || occ_facet_set_init(&m->facets, j->m, FACETS_OF_PATCHES, e) ||

@@ -24,7 +24,7 @@ void ff_stats_count(struct ff_stats *s, const struct ff *f)
 
 void ff_stats_count_pairs(struct ff_stats *s, const struct exchange_counts *c)
 {
-	s->pairs[0] += c->clear;
+	s->pairs[0] += c->unoccluded;
 	s->pairs[1] += c->hidden;
 	s->pairs[2] += c->partly;
 	s->pairs[3] += c->crowded;

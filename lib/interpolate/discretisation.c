@@ -8,18 +8,28 @@
 #include "lib/base/mem.h"
 #include "lib/base/parallel.h"
 #include "lib/base/vec3.h"
+#include "lib/data/solution.h"
 #include "lib/interpolate/smooth_groups.h"
 
-/* As in interpolation: cos 30 degrees. */
 /* The error of linear interpolation (root mean square over an element) over the second
  * difference, where that is the same all around, as in a curved field, and over its
- * variation, as at steps: as it is for such fields on jittered grids. */
+ * variation, as at steps. Measured for such fields on jittered grids: test_discretisation.c
+ * prints and checks stated over true errors of both. */
 static const double error_by_curvature = 1. / 3, error_by_roughness = 1.7;
 
-/* Noise is not equal everywhere: so much of it is taken for no detail. */
+/* Noise is not equal everywhere: so many times its variance is taken for no detail. A guess. */
 static const double noise_guard = 2;
 
-enum { NEAR_MAX = 64, CHUNK = 256, PARTS = 2 };
+/* A fit is made where the determinant of the positions' covariance is above this part of its trace
+ * squared (a quarter at most): elements in a line, thirty times as long as wide, fix no plane.
+ * A guess. */
+static const double plane_from = 1e-3;
+
+/* Counts. NEAR_MAX: elements that touch one, a dozen as a rule; further ones are left out, a guess.
+ * CHUNK: work for a thread at a time. */
+enum { NEAR_MAX = 64, CHUNK = 256 };
+
+enum { PARTS = 2 }; /* of irradiance: direct and other */
 
 struct near {
 	uint32_t element;
@@ -108,7 +118,7 @@ static int fit_weights(struct near *near, size_t n)
 		yy += near[i].w * y * y;
 	}
 	double det = xx * yy - xy * xy, trace = xx + yy;
-	if (n < 3 || !(det > 1e-3 * trace * trace))
+	if (n < 3 || !(det > plane_from * trace * trace))
 		return 0;
 	for (size_t i = 0; i < n; i++) {
 		double x = near[i].x - mx, y = near[i].y - my;
@@ -168,7 +178,10 @@ static void differences(void *arg, size_t begin, size_t end, int thread)
  * to end, to 5 %, by a histogram of logarithms; INFINITY where there is no noise. */
 static double quantile_of_ratios(const struct job *j, size_t begin, size_t end, double q)
 {
+	/* 16 bins a factor of 2 are 4 % each; 2048 of them span 2^128, and 1e-18 is 2^-60, near
+	 * their lower end at 2^-64. */
 	enum { BINS = 2048, A_FACTOR_2 = 16 };
+	static const double ratio_least = 1e-18;
 	size_t bands = (size_t)j->s->bands, n = j->s->element_sides * bands;
 	size_t count[BINS] = { 0 }, all = 0, below = 0;
 	int bin = 0;
@@ -182,7 +195,7 @@ static double quantile_of_ratios(const struct job *j, size_t begin, size_t end, 
 		}
 		if (isnan(d) || !(noise > 0))
 			continue;
-		double at = BINS / 2 + A_FACTOR_2 * log2(fmax(d * d / noise, 1e-18));
+		double at = BINS / 2 + A_FACTOR_2 * log2(fmax(d * d / noise, ratio_least));
 		count[(size_t)fmax(0, fmin(BINS - 1, at))]++;
 		all++;
 	}
@@ -211,7 +224,9 @@ static int by_patches(const struct job *j)
  * those of all light apart, since what a form factor is off by is in both parts. */
 static void correct_noise(struct job *j)
 {
-	/* Steps are in the other elements. Of chi-square with one degree of freedom: */
+	/* The quantile that is compared: steps are in the other .3 of the elements, a guess that
+	 * test_discretisation.c checks with a step. Of chi-square with one degree of freedom it is
+	 * 1.0742. */
 	static const double most = .7, chi_square = 1.0742;
 	size_t bands = (size_t)j->s->bands, n = j->s->element_sides * bands;
 	double scale[PARTS], whole = fmin(1, quantile_of_ratios(j, 0, PARTS, most) / chi_square);

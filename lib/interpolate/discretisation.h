@@ -15,12 +15,13 @@
 #define TWOPASS_DISCRETISATION_H
 
 #include "lib/data/model.h"
-#include "lib/data/solution.h"
+
+struct solution;
 
 /* Scales standard errors, of each part all alike, down to what most elements differ by from
  * their neighbours, if that is less (not where the elements of each patch share a value,
- * which then says nothing). Fills s->discretisation and its part
- * s->discretisation_direct [2E][bands], in units of irradiance: root mean square over the
+ * which then says nothing). Fills s->error.discretisation and its part
+ * s->error.discretisation_direct [2E][bands], in units of irradiance: root mean square over the
  * element-side. 0 where too few others of the same smooth surface touch it and its
  * neighbours, since nothing is known there. Light groups are summed. O(elements), the same
  * for any number of threads. 0, or -1 and e. */

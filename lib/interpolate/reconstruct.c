@@ -7,6 +7,7 @@
 #include "lib/base/mem.h"
 #include "lib/base/parallel.h"
 #include "lib/base/vec3.h"
+#include "lib/data/solution.h"
 #include "lib/interpolate/reconstruct_internal.h"
 
 /* ---- keeping means ----
@@ -106,6 +107,8 @@ static void store_groups(void *arg, size_t begin, size_t end, int thread)
 
 static void run(struct reconstruct_job *j, int threads)
 {
+	/* CHUNK: work for a thread at a time. SPREADS, a count: what means still miss is averaged so
+	 * often, over that many rings of elements, so that noise cancels. A guess. */
 	enum { CHUNK = 1024, SPREADS = 3 };
 
 	par_for(j->g.groups, CHUNK, threads, interp_reconstruct_fit, j, NULL);
@@ -140,10 +143,13 @@ static void add_part(struct reconstruct_job *j, const double *part, size_t colum
 		}
 }
 
-/* An exact value: what differs from it is not consistent with it. */
+/* 1 over a variance; of an exact value nearly the largest number there is, so that what differs
+ * from it is not consistent with it. */
 static double precision_of(double variance)
 {
-	return variance > 1e-300 ? 1 / variance : 1e300;
+	static const double exact = 1e300;
+
+	return variance > 1 / exact ? 1 / variance : exact;
 }
 
 /* Precisions of the columns: of the sum of all parts, if its error is all that is known. */

@@ -5,9 +5,25 @@
 
 #include "lib/base/vec3.h"
 
-/* A fit is used if its variance at the vertex is at most this many times the
- * variance of one element. */
+/* A fit is used if its variance at the vertex is at most this many times the variance of one
+ * element: a sixth inside a regular grid, more where a function is drawn out beyond few
+ * elements, as at corners of a surface. A guess. */
 static const double accepted_variance = 1.5;
+
+/* A fit needs positions whose covariance has a determinant above this part of its trace squared:
+ * anything but a line, since accepted_variance rules out what is nearly one. */
+static const double plane_from = 1e-12;
+
+/* A group has a normal if those of its elements add up to this part of their area. A guess. */
+static const double normal_from = .1;
+
+/* 1 over the unexplained part of the elements' variation from which a fit may not leave their
+ * range. A guess. */
+static const double slack_by_unexplained = 4;
+
+/* Chi-square per degree of freedom from which a fit does not count at all; at 1 less, which is
+ * what noise alone makes of it, it counts in full. A guess. */
+static const double inconsistent_from = 2;
 
 /* A linear function over some elements near a vertex, in coordinates (x, y) of the
  * tangent plane about it: value = mean + gradient . (-mx, -my). */
@@ -36,7 +52,7 @@ static int group_normal(const struct reconstruct_job *j, size_t group, double n[
 		v3_mad(n, p->area, p->normal, n);
 		area += p->area;
 	}
-	return v3_normalise(n) > .1 * area && area > 0;
+	return v3_normalise(n) > normal_from * area && area > 0;
 }
 
 static void list_group(const struct reconstruct_job *j, struct reconstruct_scratch *s, size_t group,
@@ -120,7 +136,7 @@ static void prepare(const struct reconstruct_scratch *s, struct fit *f)
 	}
 	double det = xx * yy - xy * xy, trace = xx + yy;
 	f->variance = (double)INFINITY;
-	if (f->n < 3 || !(det > 1e-12 * trace * trace))
+	if (f->n < 3 || !(det > plane_from * trace * trace))
 		return;
 	f->ixx = yy / det;
 	f->ixy = -xy / det;
@@ -172,7 +188,7 @@ static inline struct channels fit_channels(const struct reconstruct_job *j,
 	if (f->n > 3) {
 		double free = (double)(f->n - 1) / (double)(f->n - 3);
 		lanes left = free * (1 - (c.gx * cx + c.gy * cy) / variance);
-		lanes part = clamp(1 - 4 * left, none, lanes_all(1));
+		lanes part = clamp(1 - slack_by_unexplained * left, none, lanes_all(1));
 		c.slack = lanes_choose(variance > 0, part * (high - low), none);
 	}
 	return c;
@@ -202,7 +218,7 @@ static inline lanes consistency(const struct reconstruct_job *j, const struct re
 		          c->gy * (p->y - f->my);
 		chi2 += d * d * j->precision[p->element * j->vectors + v];
 	}
-	return clamp(2 - chi2 / (double)(f->n - 3), none, lanes_all(1));
+	return clamp(inconsistent_from - chi2 / (double)(f->n - 3), none, lanes_all(1));
 }
 
 /* Area-weighted mean of the n elements at the vertex: what is left without a fit. */

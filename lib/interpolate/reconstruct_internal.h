@@ -1,4 +1,4 @@
-/* What reconstruct.c and interp_reconstruct_fit.c share. */
+/* What reconstruct.c and reconstruct_fit.c share (private to lib/interpolate). */
 #ifndef TWOPASS_RECONSTRUCT_INTERNAL_H
 #define TWOPASS_RECONSTRUCT_INTERNAL_H
 
@@ -8,14 +8,14 @@
 #include "lib/base/channels.h"
 #include "lib/base/constants.h"
 #include "lib/data/model.h"
-#include "lib/data/solution.h"
 #include "lib/interpolate/reconstruct.h"
 #include "lib/interpolate/smooth_groups.h"
 
+/* Counts; guesses. */
 enum {
-	RINGS = 3,    /* of neighbours that a fit may reach */
-	NEAR_MAX = 96,/* elements that one of them may add */
-	SEEN_MAX = 4096 /* corners that may be looked at for it */
+	RINGS = 3,      /* of elements that a fit may reach */
+	NEAR_MAX = 96,  /* elements that one of them may add: three times the third of a regular grid */
+	SEEN_MAX = 4096 /* corners that may be looked at for it: bounds the time of a fan of slivers */
 };
 
 /* Where an element is. */
@@ -56,7 +56,8 @@ struct reconstruct_job {
 	struct reconstruct_scratch *scratch;  /* one a thread */
 };
 
-/* Fits the values at the vertices of groups [begin, end) of a struct reconstruct_job; for par_for. */
+/* Fits the values at the vertices of groups [begin, end) of a struct reconstruct_job; for
+ * par_for. */
 void interp_reconstruct_fit(void *job, size_t begin, size_t end, int thread);
 
 #endif

@@ -7,6 +7,7 @@
 
 #include "lib/base/mem.h"
 #include "lib/base/vec3.h"
+#include "lib/data/solution.h"
 #include "lib/mesh/stages.h"
 
 /* What is left of an element's energy when it has been halved once: 1/4 in a smooth field,

@@ -6,6 +6,7 @@
 
 #include "lib/base/mem.h"
 #include "lib/base/vec3.h"
+#include "lib/data/solution.h"
 #include "lib/geometry/box_tree.h"
 #include "lib/mesh/stages.h"
 

@@ -9,7 +9,8 @@
 
 #include "lib/base/parallel.h"
 #include "lib/data/model.h"
-#include "lib/data/solution.h"
+
+struct solution;
 
 /* A length in metres or, if relative, as a fraction of the diagonal of the
  * scene's bounding box; INFINITY = no bound. */

@@ -6,6 +6,7 @@
 
 #include "lib/base/constants.h"
 #include "lib/base/mem.h"
+#include "lib/base/replicates.h"
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
 #include "lib/data/punctual.h"
@@ -15,13 +16,17 @@
 #include "lib/occlusion/facet_set.h"
 #include "lib/occlusion/visible_region.h"
 
+/* Limits of the formula, counts. Both are guesses; trace(1) tells users of them, and the table of
+ * README.md (tests/bench/report) what formula and shadow rays cost. */
 enum {
-	EXACT_MOST = 48,     /* emitters: of more, all are sampled */
-	BLOCKERS_MOST = 16,  /* before one of them; beyond, rays cost less */
-	PARTS = 4            /* independent scrambles that a standard error comes from */
+	EXACT_MOST = 48,     /* emitters: each is looked at for each side; of more all are sampled */
+	OCCLUDERS_MOST = 16  /* between a side and one of them: each is clipped off at every point,
+	                        and beyond, rays cost less */
 };
 
-/* Shadow rays of a part: at first, and at most. */
+/* Shadow rays of a part, counts: at first and at most. Powers of two, which Sobol points fill
+ * evenly; both are guesses. 4 x 256 rays reach an error of 3 % where half the light is hidden,
+ * if they are no better than independent ones. */
 enum { RAYS_FIRST = 4, RAYS_MOST = 256 };
 
 struct direct {
@@ -29,16 +34,16 @@ struct direct {
 	const struct ray_scene *rays;
 	double centre[3];
 	struct emitters emitters;
-	struct occluder_set bodies;
+	struct occluder_set occluders;
 	int exact;                    /* emitters are looked at one by one */
 };
 
 /* What the side sees of an emitter. */
-struct outlook {
+struct visible_emitter {
 	const struct emitter *emitter;
 	struct facet_room room;
 	const struct facet *f;        /* the part in front of the side's plane */
-	uint64_t blockers;            /* bits of the seer's that may hide something */
+	uint64_t occluders;           /* bits of the side's that may hide something */
 	int sampled;
 };
 
@@ -46,8 +51,8 @@ struct direct_worker {
 	const struct direct *d;
 	uint32_t element_side;        /* UINT32_MAX: none yet */
 	double normal[3];
-	struct outlook *outlook;      /* [emitters, or EXACT_MOST at most] */
-	size_t outlooks;
+	struct visible_emitter *visible_emitter; /* [emitters, or EXACT_MOST at most] */
+	size_t visible_emitters;
 	double *weight;               /* [emitters] cumulated, of sampled ones */
 	struct visible_point visible;
 	struct shaft shaft;
@@ -66,7 +71,7 @@ struct direct *occ_direct_new(const struct model *m, const struct ray_scene *ray
 	occ_facet_centre(m, d->centre);
 	int bad = occ_emitters_init(&d->emitters, m, e);
 	d->exact = d->emitters.n <= EXACT_MOST;
-	if (!bad && (!d->exact || !occ_occluder_set_init(&d->bodies, m, e)))
+	if (!bad && (!d->exact || !occ_occluder_set_init(&d->occluders, m, e)))
 		return d;
 	occ_direct_free(d);
 	return NULL;
@@ -77,7 +82,7 @@ void occ_direct_free(struct direct *d)
 	if (!d)
 		return;
 	occ_emitters_free(&d->emitters);
-	occ_occluder_set_free(&d->bodies);
+	occ_occluder_set_free(&d->occluders);
 	free(d);
 }
 
@@ -89,9 +94,9 @@ struct direct_worker *occ_direct_worker_new(const struct direct *d, struct err *
 		return NULL;
 	w->d = d;
 	w->element_side = UINT32_MAX;
-	w->outlook = mem_new(d->exact ? d->emitters.n : 0, sizeof *w->outlook, "direct light", e);
+	w->visible_emitter = mem_new(d->exact ? d->emitters.n : 0, sizeof *w->visible_emitter, "direct light", e);
 	w->weight = mem_new(d->emitters.n, sizeof *w->weight, "direct light", e);
-	if (w->outlook && w->weight)
+	if (w->visible_emitter && w->weight)
 		return w;
 	occ_direct_worker_free(w);
 	return NULL;
@@ -101,7 +106,7 @@ void occ_direct_worker_free(struct direct_worker *w)
 {
 	if (!w)
 		return;
-	free(w->outlook);
+	free(w->visible_emitter);
 	free(w->weight);
 	free(w);
 }
@@ -128,35 +133,35 @@ static const struct facet *front_part(const struct facet *f, const struct facet 
 	return geo_facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
 }
 
-/* Puts the sight line's bodies behind those that the seer has. 0 if there is no room. */
-static int put_blockers(struct direct_worker *w, int *used, struct outlook *o)
+/* Puts the shaft's occluders behind those that the side has. 0 if there is no room. */
+static int put_occluders(struct direct_worker *w, int *used, struct visible_emitter *o)
 {
-	if (*used + w->shaft.bodies > SHAFT_OCCLUDERS)
+	if (*used + w->shaft.occluders > SHAFT_OCCLUDERS)
 		return 0;
-	for (int i = 0; i < w->shaft.bodies; i++)
-		if (occ_occluder_make(&w->d->bodies, w->shaft.body[i], o->f, &w->visible.occluder[*used]))
-			o->blockers |= (uint64_t)1 << (*used)++;
+	for (int i = 0; i < w->shaft.occluders; i++)
+		if (occ_occluder_make(&w->d->occluders, w->shaft.occluder[i], o->f, &w->visible.occluder[*used]))
+			o->occluders |= (uint64_t)1 << (*used)++;
 	return 1;
 }
 
 /* What the element-side f sees of an emitter; 0 if nothing. */
-static int look(struct direct_worker *w, const struct facet *f, const struct emitter *t, int *used,
-                struct outlook *o)
+static int find_visible(struct direct_worker *w, const struct facet *f, const struct emitter *t, int *used,
+                struct visible_emitter *o)
 {
 	const struct direct *d = w->d;
 	struct facet_room room;
-	const struct facet *from = front_part(f, &t->f, d->bodies.near, &room);
+	const struct facet *from = front_part(f, &t->f, d->occluders.near, &room);
 
 	o->emitter = t;
-	o->blockers = 0;
+	o->occluders = 0;
 	o->sampled = 0;
-	o->f = from ? front_part(&t->f, f, d->bodies.near, &o->room) : NULL;
+	o->f = from ? front_part(&t->f, f, d->occluders.near, &o->room) : NULL;
 	if (!o->f)
 		return 0;
-	w->shaft.most = BLOCKERS_MOST;
-	enum shaft_state sight = occ_shaft_cull(&w->shaft, &d->bodies, from, o->f);
-	o->sampled = sight == SHAFT_CROWDED || (sight == SHAFT_PARTLY && !put_blockers(w, used, o));
-	return sight != SHAFT_HIDDEN;
+	w->shaft.most = OCCLUDERS_MOST;
+	enum shaft_state state = occ_shaft_cull(&w->shaft, &d->occluders, from, o->f);
+	o->sampled = state == SHAFT_CROWDED || (state == SHAFT_PARTLY && !put_occluders(w, used, o));
+	return state != SHAFT_HIDDEN;
 }
 
 /* The element as a facet whose front is the side. */
@@ -183,11 +188,11 @@ void occ_direct_begin(struct direct_worker *w, uint32_t element_side)
 	struct facet f = side_facet(d, element_side, corner);
 	w->element_side = element_side;
 	memcpy(w->normal, f.normal, sizeof w->normal);
-	w->outlooks = 0;
+	w->visible_emitters = 0;
 	for (size_t i = 0; i < d->emitters.n && d->exact; i++)
-		w->outlooks += (size_t)look(w, &f, &d->emitters.emitter[i], &used,
-		                            &w->outlook[w->outlooks]);
-	occ_visible_begin(&w->visible, used, d->bodies.near);
+		w->visible_emitters += (size_t)find_visible(w, &f, &d->emitters.emitter[i], &used,
+		                            &w->visible_emitter[w->visible_emitters]);
+	occ_visible_begin(&w->visible, used, d->occluders.near);
 }
 
 /* ---- by formula ---- */
@@ -213,6 +218,10 @@ static double angle(const double unit[3], const double v[3])
 static double weighted_part(const struct emitter *t, const double x[3], const struct facet *f,
                             const struct direct_weight *weight, int depth)
 {
+	/* DEEPEST, a count of quarterings: parts 2^-24 of the polygon wide are rounding. ROOM: what
+	 * the largest rule takes of the most corners (geo_cubature_points). A part is small when
+	 * its radius is a third of its distance, or the weight's width: a guess for the 7 points
+	 * of degree 5. */
 	enum { DEEPEST = 24, ROOM = 36 * (FACET_CORNERS / 2) };
 	struct facet_room quarter[4];
 	double d[3], sum = 0, small = fmin(1. / 3, weight->width);
@@ -270,14 +279,14 @@ static double weighted_polygon(const struct point_polygon *p, void *arg)
 }
 
 /* NaN and e when memory is short. */
-static double weighted(struct direct_worker *w, const struct outlook *o, const double x[3],
+static double weighted(struct direct_worker *w, const struct visible_emitter *o, const double x[3],
                        const struct direct_weight *weight, struct err *e)
 {
 	struct weighted_eye eye = { o->emitter, x, weight };
 
 	if (v3_dot(o->emitter->f.normal, x) - o->emitter->f.offset <= 0)
 		return 0;
-	return occ_visible_integrate(&w->visible, x, o->f, o->blockers, weighted_polygon, &eye, e);
+	return occ_visible_integrate(&w->visible, x, o->f, o->occluders, weighted_polygon, &eye, e);
 }
 
 int occ_direct_weighted(struct direct_worker *w, const double world[3],
@@ -287,12 +296,12 @@ int occ_direct_weighted(struct direct_worker *w, const double world[3],
 
 	v3_sub(world, w->d->centre, x);
 	memset(h, 0, (size_t)w->d->m->bands * sizeof *h);
-	for (size_t i = 0; i < w->outlooks; i++) {
-		double f = weighted(w, &w->outlook[i], x, weight, e);
+	for (size_t i = 0; i < w->visible_emitters; i++) {
+		double f = weighted(w, &w->visible_emitter[i], x, weight, e);
 		if (isnan(f))
 			return -1;
 		for (int b = 0; b < w->d->m->bands; b++)
-			h[b] += f * w->outlook[i].emitter->radiance[b];
+			h[b] += f * w->visible_emitter[i].emitter->radiance[b];
 	}
 	return 0;
 }
@@ -301,8 +310,8 @@ int occ_direct_sampled(const struct direct_worker *w)
 {
 	int sampled = !w->d->exact;
 
-	for (size_t i = 0; i < w->outlooks; i++)
-		sampled |= w->outlook[i].sampled;
+	for (size_t i = 0; i < w->visible_emitters; i++)
+		sampled |= w->visible_emitter[i].sampled;
 	return sampled;
 }
 
@@ -312,17 +321,17 @@ static double cosine(const double dir[3], const void *normal)
 }
 
 /* Irradiance for unit radiance along the emitter's normal. NaN and e when memory is short. */
-static double exact(struct direct_worker *w, const struct outlook *o, const double x[3],
+static double exact(struct direct_worker *w, const struct visible_emitter *o, const double x[3],
                     struct err *e)
 {
 	const struct emitter *t = o->emitter;
 
 	if (v3_dot(t->f.normal, x) - t->f.offset <= 0)
 		return 0;
-	if (!o->blockers && t->exponent == 1)
+	if (!o->occluders && t->exponent == 1)
 		return PI * fmax(0, geo_contour_point(x, w->normal, o->f->n, o->f->v));
 	if (t->exponent == 1)
-		return PI * occ_visible_exchange(&w->visible, x, w->normal, o->f, o->blockers, e);
+		return PI * occ_visible_exchange(&w->visible, x, w->normal, o->f, o->occluders, e);
 	struct direct_weight all = { .at = cosine, .arg = w->normal, .width = 1, .reach = PI };
 	memcpy(all.axis, w->normal, sizeof all.axis);
 	return weighted(w, o, x, &all, e);
@@ -346,7 +355,7 @@ static double guess(const struct direct_worker *w, const struct emitter *t, cons
 }
 
 /* 1 if nothing is between points x and y of the side and of an emitter. */
-static int clear_line(struct direct_worker *w, const double x[3], const double y[3],
+static int unoccluded(struct direct_worker *w, const double x[3], const double y[3],
                       const struct emitter *t)
 {
 	double from[3], to[3];
@@ -371,13 +380,13 @@ static void add_ray(struct direct_worker *w, const double x[3], size_t n, const 
 		lo += w->weight[lo + half - 1] <= at ? half : 0;
 		left -= half;
 	}
-	const struct emitter *t = d->exact ? w->outlook[lo].emitter : &d->emitters.emitter[lo];
+	const struct emitter *t = d->exact ? w->visible_emitter[lo].emitter : &d->emitters.emitter[lo];
 	double share = (w->weight[lo] - (lo ? w->weight[lo - 1] : 0)) / total;
 	geo_facet_point(&t->f, u[1], u[2], y);
 	v3_sub(y, x, v);
 	double r2 = v3_dot(v, v), r = sqrt(r2);
 	double here = v3_dot(v, w->normal) / r, there = -v3_dot(v, t->f.normal) / r;
-	if (!(here > 0 && there > 0 && share > 0) || !clear_line(w, x, y, t))
+	if (!(here > 0 && there > 0 && share > 0) || !unoccluded(w, x, y, t))
 		return;
 	double scale = here * lobe(there, t->exponent) / r2 * t->f.area / share;
 	for (int b = 0; b < d->m->bands; b++)
@@ -388,45 +397,41 @@ static void add_ray(struct direct_worker *w, const double x[3], size_t n, const 
 struct aim {
 	double relative;
 	const double *other;
-	double unhidden;              /* about what there would be if nothing were hidden */
+	double unoccluded;            /* about what there would be if nothing were hidden */
 };
 
 /* Mean of the parts, its standard error, and whether that is small enough. Where no ray
  * arrived, the next one may be the first that does. */
-static int settled(double part[PARTS][BANDS_MAX], int bands, double rays, const struct aim *aim,
-                   double *h, double *error)
+static int settled(double part[REPLICATES][BANDS_MAX], int bands, double rays,
+                   const struct aim *aim, double *h, double *error)
 {
 	int good = 1;
 
 	for (int b = 0; b < bands; b++) {
-		double mean = 0, square = 0;
-		for (int p = 0; p < PARTS; p++)
-			mean += part[p][b] / PARTS;
-		for (int p = 0; p < PARTS; p++)
-			square += (part[p][b] - mean) * (part[p][b] - mean);
-		h[b] = mean / rays;
-		error[b] = mean > 0 ? sqrt(square / (PARTS * (PARTS - 1))) / rays
-		                    : aim->unhidden / (PARTS * rays);
+		struct replicates r = replicates_of(&part[0][b], BANDS_MAX, REPLICATES);
+		h[b] = r.mean / rays;
+		error[b] = r.mean > 0 ? replicates_error(r, REPLICATES) / rays
+		                      : aim->unoccluded / (REPLICATES * rays);
 		good &= error[b] <= aim->relative * (h[b] + aim->other[b]);
 	}
 	return good;
 }
 
-/* What the first n emitters bring, or outlooks, by their cumulated weights. */
+/* What the first n emitters bring, or those that the side sees, by their cumulated weights. */
 static void sample(struct direct_worker *w, const double x[3], size_t n, uint64_t seed,
                    const struct aim *aim, double *h, double *error)
 {
-	double part[PARTS][BANDS_MAX] = { { 0 } }, u[3];
-	uint32_t from = 0, scramble[PARTS][3], bits[3];
+	double part[REPLICATES][BANDS_MAX] = { { 0 } }, u[3];
+	uint32_t from = 0, scramble[REPLICATES][3], bits[3];
 
-	for (int p = 0; p < PARTS; p++)
+	for (int p = 0; p < REPLICATES; p++)
 		for (int k = 0; k < 3; k++)
 			scramble[p][k] = rng_sobol_seed(seed + (uint64_t)p, k);
 	for (uint32_t to = RAYS_FIRST; to <= RAYS_MOST; from = to, to *= 2) {
 		for (uint32_t i = from; i < to; i++) {
 			for (int k = 0; k < 3; k++)
 				bits[k] = rng_sobol_bits(i, k);
-			for (int p = 0; p < PARTS; p++) {
+			for (int p = 0; p < REPLICATES; p++) {
 				for (int k = 0; k < 3; k++)
 					u[k] = rng_scramble(bits[k], scramble[p][k]);
 				add_ray(w, x, n, u, part[p]);
@@ -462,28 +467,28 @@ int occ_direct_at(struct direct_worker *w, const double world[3], uint64_t seed,
                   const double *other, double *h, double *error, struct err *e)
 {
 	const struct direct *d = w->d;
-	size_t n = d->exact ? w->outlooks : d->emitters.n;
+	size_t n = d->exact ? w->visible_emitters : d->emitters.n;
 	double x[3], sum = 0;
 
 	v3_sub(world, d->centre, x);
 	memset(h, 0, (size_t)d->m->bands * sizeof *h);
 	memset(error, 0, (size_t)d->m->bands * sizeof *error);
 	for (size_t i = 0; i < n; i++) {
-		const struct emitter *t = d->exact ? w->outlook[i].emitter : &d->emitters.emitter[i];
-		if (!d->exact || w->outlook[i].sampled)
+		const struct emitter *t = d->exact ? w->visible_emitter[i].emitter : &d->emitters.emitter[i];
+		if (!d->exact || w->visible_emitter[i].sampled)
 			sum += guess(w, t, x);
 		w->weight[i] = sum;
 	}
 	if (sum > 0)
 		sample(w, x, n, seed, &(struct aim){ relative, other, sum }, h, error);
 	for (size_t i = 0; i < n && d->exact; i++) {
-		if (w->outlook[i].sampled)
+		if (w->visible_emitter[i].sampled)
 			continue;
-		double f = exact(w, &w->outlook[i], x, e);
+		double f = exact(w, &w->visible_emitter[i], x, e);
 		if (isnan(f))
 			return -1;
 		for (int b = 0; b < d->m->bands; b++)
-			h[b] += f * w->outlook[i].emitter->radiance[b];
+			h[b] += f * w->visible_emitter[i].emitter->radiance[b];
 	}
 	add_lights(w, world, h);
 	return 0;

@@ -1,11 +1,12 @@
-/* Irradiance that comes straight from emitters and punctual lights, at points where a picture needs it.
+/* Irradiance that comes straight from emitters and punctual lights, at points where a picture
+ * needs it.
  *
- * What a point sees of an emitter's polygon past the convex bodies between is found by
+ * What a point sees of an emitter's polygon past the convex occluders between is found by
  * clipping, and its irradiance by Lambert's formula: exact, without noise. Emitters that
- * more bodies stand before than that pays for, and scenes of many emitters, are sampled
+ * more occluders stand before than that pays for, and scenes of many emitters, are sampled
  * by shadow rays instead, which come with a standard error. A punctual light takes one
- * shadow ray and has no error. Light through mirrors and
- * panes is not direct: everything hides what is behind it. */
+ * shadow ray and has no error. Light through mirrors and panes is not direct: everything hides
+ * what is behind it. */
 #ifndef TWOPASS_DIRECT_H
 #define TWOPASS_DIRECT_H
 
@@ -29,7 +30,7 @@ struct direct_worker *occ_direct_worker_new(const struct direct *d, struct err *
 void occ_direct_worker_free(struct direct_worker *w);
 
 /* Makes the side the one that the points of occ_direct_at are on; free if it already was.
- * O(emitters x bodies near the lines between). */
+ * O(emitters x occluders near the lines between). */
 void occ_direct_begin(struct direct_worker *w, uint32_t element_side);
 
 /* Irradiance of the side at a point x (world) of its element from all emitters and lights, into
@@ -37,7 +38,7 @@ void occ_direct_begin(struct direct_worker *w, uint32_t element_side);
  * are aimed by `seed`, as many as it takes for an error of `relative` times h and what the
  * point has beside, other[bands], within limits. The result depends on nothing else. 0, or
  * -1 and e when memory is short.
- * O(emitters x bodies between + lights). */
+ * O(emitters x occluders between + lights). */
 int occ_direct_at(struct direct_worker *w, const double x[3], uint64_t seed, double relative,
                   const double *other, double *h, double *error, struct err *e);
 
@@ -54,7 +55,7 @@ int occ_direct_sampled(const struct direct_worker *w);
 
 /* The radiance that a point of a side that samples none gets straight from emitters,
  * integrated over directions with a weight, into h[bands]. Punctual lights have none. 0, or
- * -1 and e when memory is short. O(emitters x bodies between). */
+ * -1 and e when memory is short. O(emitters x occluders between). */
 int occ_direct_weighted(struct direct_worker *w, const double x[3], const struct direct_weight *weight,
                         double *h, struct err *e);
 

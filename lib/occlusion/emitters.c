@@ -8,7 +8,8 @@
 #include "lib/occlusion/occluder_polygons.h"
 #include "lib/scatter/bsdf.h"
 
-enum { AT_ONCE = 8 };  /* corners of a facet; larger polygons are cut into fans */
+/* A count: corners of a facet; larger polygons are cut into fans. As in facet_set.c. */
+enum { AT_ONCE = 8 };
 
 struct maker {
 	const struct model *m;

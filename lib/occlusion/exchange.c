@@ -2,18 +2,17 @@
 
 #include <math.h>
 
+#include "lib/base/replicates.h"
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
 
-enum { CROWD_PARTS = 4 };
-
 void occ_exchanger_init(struct exchanger *x, const struct exchange_options *o,
-                        const struct occluder_set *bodies, struct ray_scene *rays,
+                        const struct occluder_set *occluders, struct ray_scene *rays,
                         const double centre[3])
 {
-	*x = (struct exchanger){ .o = *o, .bodies = bodies, .rays = rays, .centre = centre };
-	x->shaft.most = o->bodies < SHAFT_OCCLUDERS ? o->bodies : SHAFT_OCCLUDERS;
-	geo_unoccluded_init(&x->clear, o->relative);
+	*x = (struct exchanger){ .o = *o, .occluders = occluders, .rays = rays, .centre = centre };
+	x->shaft.most = o->occluders < SHAFT_OCCLUDERS ? o->occluders : SHAFT_OCCLUDERS;
+	geo_unoccluded_init(&x->unoccluded, o->relative);
 }
 
 void occ_exchanger_free(struct exchanger *x)
@@ -21,17 +20,17 @@ void occ_exchanger_free(struct exchanger *x)
 	occ_occluded_free(&x->occluded);
 }
 
-/* ---- too many bodies between: rays between points of both ---- */
+/* ---- too many occluders between: rays between points of both ---- */
 
 static double crowded(struct exchanger *x, const struct facet *a, const struct facet *b,
-                      double clear, uint64_t seed, double *error)
+                      double unoccluded, uint64_t seed, double *error)
 {
-	double part[CROWD_PARTS], mean = 0, square = 0;
+	double part[REPLICATES];
 	uint32_t rays = (uint32_t)x->o.crowd_rays;
 
-	for (uint32_t p = 0; p < CROWD_PARTS; p++) {
-		double seen = 0, all = 0;
-		for (uint32_t i = 0; i < rays / CROWD_PARTS; i++) {
+	for (uint32_t p = 0; p < REPLICATES; p++) {
+		double visible = 0, all = 0;
+		for (uint32_t i = 0; i < rays / REPLICATES; i++) {
 			double u[4], y[3], z[3], d[3];
 			for (int k = 0; k < 4; k++)
 				u[k] = rng_sobol(i, k, seed + p);
@@ -45,15 +44,14 @@ static double crowded(struct exchanger *x, const struct facet *a, const struct f
 			ray_leave(x->rays, a->normal, y);
 			ray_leave(x->rays, b->normal, z);
 			all += w;
-			seen += w > 0 && !ray_blocked(x->rays, y, z) ? w : 0;
+			visible += w > 0 && !ray_blocked(x->rays, y, z) ? w : 0;
 		}
-		part[p] = all > 0 ? seen / all : 0;
-		mean += part[p] / CROWD_PARTS;
+		part[p] = all > 0 ? visible / all : 0;
 	}
-	for (uint32_t p = 0; p < CROWD_PARTS; p++)
-		square += (part[p] - mean) * (part[p] - mean);
-	*error = clear * (sqrt(square / (CROWD_PARTS * (CROWD_PARTS - 1))) + 1. / rays);
-	return clear * mean;
+	/* One ray more: parts that agree by chance are no proof. */
+	struct replicates r = replicates_of(part, 1, REPLICATES);
+	*error = unoccluded * (replicates_error(r, REPLICATES) + 1. / rays);
+	return unoccluded * r.mean;
 }
 
 /* ---- a pair ---- */
@@ -80,29 +78,29 @@ static const struct facet *front_part(const struct facet *f, const struct facet 
 
 /* Can nothing be between, and is each wholly in front of the other? What most pairs of a
  * convex scene are. */
-static int plainly_clear(const struct exchanger *x, const struct facet *a, const struct facet *b)
+static int plainly_unoccluded(const struct exchanger *x, const struct facet *a, const struct facet *b)
 {
-	return !x->bodies->nodes && v3_dot(b->normal, a->centre) - b->offset >= a->radius &&
+	return !x->occluders->nodes && v3_dot(b->normal, a->centre) - b->offset >= a->radius &&
 	       v3_dot(a->normal, b->centre) - a->offset >= b->radius;
 }
 
-static double clear_pair(struct exchanger *x, const struct facet *a, struct unoccluded_points pa,
+static double unoccluded_pair(struct exchanger *x, const struct facet *a, struct unoccluded_points pa,
                          const struct facet *b, struct unoccluded_points pb, double *error)
 {
-	double clear = geo_unoccluded_exchange(&x->clear, a, pa, b, pb);
+	double unoccluded = geo_unoccluded_exchange(&x->unoccluded, a, pa, b, pb);
 
-	*error = x->o.relative * clear;
-	x->counts.clear++;
-	return clear;
+	*error = x->o.relative * unoccluded;
+	x->counts.unoccluded++;
+	return unoccluded;
 }
 
 static double any_pair(struct exchanger *x, const struct facet_set *sa, uint32_t i,
                        const struct facet_set *sb, uint32_t j, double *error, struct err *e)
 {
-	struct unoccluded_points pa = { sa->stored[i], &sa->joint[i] };
-	struct unoccluded_points pb = { sb->stored[j], &sb->joint[j] };
+	struct unoccluded_points pa = { sa->stored[i], &sa->pair[i] };
+	struct unoccluded_points pb = { sb->stored[j], &sb->pair[j] };
 	struct facet_room room[2];
-	double near = x->bodies->near;
+	double near = x->occluders->near;
 	const struct facet *fa = &sa->facet[i], *fb = &sb->facet[j];
 	const struct facet *a = front_part(fa, fb, near, &room[0], &pa);
 	const struct facet *b = a ? front_part(fb, fa, near, &room[1], &pb) : NULL;
@@ -111,28 +109,28 @@ static double any_pair(struct exchanger *x, const struct facet_set *sa, uint32_t
 	if (!b)
 		return 0;
 	x->counts.pairs++;
-	enum shaft_state sight = occ_shaft_cull(&x->shaft, x->bodies, a, b);
-	if (sight == SHAFT_HIDDEN) {
+	enum shaft_state state = occ_shaft_cull(&x->shaft, x->occluders, a, b);
+	if (state == SHAFT_HIDDEN) {
 		x->counts.hidden++;
 		return 0;
 	}
-	if (sight == SHAFT_PARTLY) {
+	if (state == SHAFT_PARTLY) {
 		double before = x->occluded.visible.evaluations;
 		double tolerance = x->o.absolute * fmin(fa->area, fb->area);
-		double sum = occ_occluded_exchange(&x->occluded, &x->clear, &x->shaft, tolerance, x->o.most, error, e);
+		double sum = occ_occluded_exchange(&x->occluded, &x->unoccluded, &x->shaft, tolerance, x->o.most, error, e);
 		x->counts.partly++;
 		x->counts.evaluations += x->occluded.visible.evaluations - before;
 		return sum;
 	}
-	if (sight == SHAFT_CROWDED && !x->o.crowd_rays) {
+	if (state == SHAFT_CROWDED && !x->o.crowd_rays) {
 		x->counts.crowded++;
 		return 0;
 	}
-	if (sight == SHAFT_CLEAR)
-		return clear_pair(x, a, pa, b, pb, error);
-	double clear = geo_unoccluded_exchange(&x->clear, a, pa, b, pb);
+	if (state == SHAFT_UNOCCLUDED)
+		return unoccluded_pair(x, a, pa, b, pb, error);
+	double unoccluded = geo_unoccluded_exchange(&x->unoccluded, a, pa, b, pb);
 	x->counts.crowded++;
-	return crowded(x, a, b, clear, ((uint64_t)i << 32) ^ j, error);
+	return crowded(x, a, b, unoccluded, ((uint64_t)i << 32) ^ j, error);
 }
 
 double occ_exchange(struct exchanger *x, const struct facet_set *sa, uint32_t i,
@@ -140,9 +138,9 @@ double occ_exchange(struct exchanger *x, const struct facet_set *sa, uint32_t i,
 {
 	const struct facet *a = &sa->facet[i], *b = &sb->facet[j];
 
-	if (!plainly_clear(x, a, b))
+	if (!plainly_unoccluded(x, a, b))
 		return any_pair(x, sa, i, sb, j, error, e);
 	x->counts.pairs++;
-	return clear_pair(x, a, (struct unoccluded_points){ sa->stored[i], &sa->joint[i] },
-	                  b, (struct unoccluded_points){ sb->stored[j], &sb->joint[j] }, error);
+	return unoccluded_pair(x, a, (struct unoccluded_points){ sa->stored[i], &sa->pair[i] },
+	                  b, (struct unoccluded_points){ sb->stored[j], &sb->pair[j] }, error);
 }

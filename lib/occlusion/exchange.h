@@ -12,30 +12,30 @@ struct exchange_options {
 	double relative;      /* error of what nothing hides, relative */
 	double absolute;      /* error of a form factor, of either facet, that is partly hidden */
 	int most;             /* evaluations spent on one such */
-	int bodies;           /* between two facets, beyond which it is a crowd */
+	int occluders;        /* between two facets, beyond which it is a crowd */
 	int crowd_rays;       /* spent on one with a crowd between; 0: it is left at 0 */
 };
 
 /* What was done, by pairs of facets. */
 struct exchange_counts {
-	double pairs, clear, hidden, partly, crowded;
+	double pairs, unoccluded, hidden, partly, crowded;
 	double evaluations;
 };
 
 /* One thread's scratch space. */
 struct exchanger {
 	struct exchange_options o;
-	const struct occluder_set *bodies;
+	const struct occluder_set *occluders;
 	struct ray_scene *rays;               /* for crowded pairs */
 	const double *centre;                 /* what facets are relative to */
-	struct unoccluded clear;
+	struct unoccluded unoccluded;
 	struct shaft shaft;
 	struct occluded occluded;
 	struct exchange_counts counts;
 };
 
 void occ_exchanger_init(struct exchanger *x, const struct exchange_options *o,
-                        const struct occluder_set *bodies, struct ray_scene *rays,
+                        const struct occluder_set *occluders, struct ray_scene *rays,
                         const double centre[3]);
 void occ_exchanger_free(struct exchanger *x);
 

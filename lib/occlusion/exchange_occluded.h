@@ -1,5 +1,5 @@
 /* Exchange areas of partly hidden facets. One of them is cut along the edges of what the
- * blockers' shadows can be; cells that see all of the other facet, or nothing, are exact;
+ * occluders' shadows can be; cells that see all of the other facet, or nothing, are exact;
  * over the others what their points see exactly is integrated by adaptive cubature. */
 #ifndef TWOPASS_EXCHANGE_OCCLUDED_H
 #define TWOPASS_EXCHANGE_OCCLUDED_H
@@ -11,16 +11,16 @@
 /* One thread's scratch space; begin with {0}, release with occ_occluded_free. */
 struct occluded {
 	struct visible_point visible;
-	int blockers;
-	struct array cell;            /* struct cell */
+	int occluders;
+	struct array cell;              /* struct cell */
 };
 
 void occ_occluded_free(struct occluded *o);
 
-/* Exchange area, m^2, of the facets of a sight line found SHAFT_PARTLY, to an absolute
+/* Exchange area, m^2, of the facets of a shaft found SHAFT_PARTLY, to an absolute
  * error of `tolerance` m^2 if `most` evaluations of what a point sees reach that; the
  * error estimate goes to *error. NaN and e when memory is short. */
-double occ_occluded_exchange(struct occluded *o, struct unoccluded *clear, const struct shaft *l,
+double occ_occluded_exchange(struct occluded *o, struct unoccluded *unoccluded, const struct shaft *l,
                              double tolerance, int most, double *error, struct err *e);
 
 #endif

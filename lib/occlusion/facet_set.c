@@ -19,7 +19,12 @@ void occ_facet_centre(const struct model *m, double centre[3])
 	}
 }
 
+/* Counts. Points of all levels take 5 KB for a quadrilateral: of up to so many facets, 150 MB, all
+ * are kept; of more only the cheap levels that far pairs need. Guesses. */
 enum { KEEP_ALL = 1 << 15, KEEP_OF_MANY = 2 };
+
+/* Sines up to this are no turn of an outline: rounding of float64 vertices far from the origin. */
+static const double straight = 1e-9;
 
 /* What is being built. */
 struct maker {
@@ -29,7 +34,10 @@ struct maker {
 	struct err *e;
 };
 
-enum { OUTLINE = 128, AT_ONCE = 8 }; /* corners of an outline; of a facet made of it */
+/* Counts of corners. Of an outline: more are curved, and elements do as well. Of a facet made of
+ * it: formulas cost the product of both facets' corners, so large ones are cut; at most
+ * FACET_CORNERS. Guesses. */
+enum { OUTLINE = 128, AT_ONCE = 8 };
 
 /* Appends a facet of the corners in `loop`, backwards for a back. */
 static int put_one(struct maker *k, const uint32_t *loop, int n, int back)
@@ -79,9 +87,9 @@ static int convex_outline(const struct model *m, uint32_t patch, uint32_t *corne
 		v3_sub(c, b, v);
 		v3_cross(u, v, turn);
 		double sine = v3_dot(turn, front) / (v3_length(u) * v3_length(v));
-		if (sine < -1e-9 || (sine < 1e-9 && v3_dot(u, v) < 0))
+		if (sine < -straight || (sine < straight && v3_dot(u, v) < 0))
 			return 0;
-		if (sine < 1e-9)
+		if (sine < straight)
 			continue;
 		if (n == OUTLINE)
 			return 0;
@@ -126,12 +134,12 @@ static int store_points(struct facet_set *s, struct err *e)
 			total += (size_t)geo_cubature_points(s->facet[i].n, l);
 	s->stored = mem_new(s->facets, sizeof *s->stored, "cubature points", e);
 	s->points = mem_new(total, 4 * sizeof *s->points, "cubature points", e);
-	s->joint = mem_new(s->facets, sizeof *s->joint, "cubature points", e);
-	if (!s->stored || !s->points || !s->joint)
+	s->pair = mem_new(s->facets, sizeof *s->pair, "cubature points", e);
+	if (!s->stored || !s->points || !s->pair)
 		return -1;
 	double *at = s->points;
 	for (size_t i = 0; i < s->facets; i++) {
-		geo_pair_fill(&s->facet[i], &s->joint[i]);
+		geo_pair_fill(&s->facet[i], &s->pair[i]);
 		for (int l = 0; l < levels; l++) {
 			size_t n = (size_t)geo_cubature_points(s->facet[i].n, l);
 			s->stored[i][l] = (struct cubature){ 0, at, at + n, at + 2 * n, at + 3 * n };
@@ -176,6 +184,6 @@ void occ_facet_set_free(struct facet_set *s)
 	free(s->corner);
 	free(s->stored);
 	free(s->points);
-	free(s->joint);
+	free(s->pair);
 	*s = (struct facet_set){ 0 };
 }

@@ -18,7 +18,7 @@ struct facet_set {
 	double *corner;
 	struct cubature (*stored)[CUBATURE_LEVELS]; /* [facets], n = 0: not kept */
 	double *points;           /* of all of them */
-	struct cubature_pair *joint;      /* [facets] */
+	struct cubature_pair *pair;      /* [facets] */
 };
 
 enum facet_places { FACETS_OF_PATCHES, FACETS_OF_ELEMENTS };

@@ -6,7 +6,7 @@
 #include "lib/base/vec3.h"
 #include "lib/occlusion/occluder_polygons.h"
 
-/* ---- what of a body is in front of a facet ---- */
+/* ---- what of an occluder is in front of a facet ---- */
 
 static void put_corner(struct occluder *o, const double x[3])
 {
@@ -23,10 +23,10 @@ static void put_edge(struct occluder *o, const double a[3], const double b[3],
 	o->edge[o->edges++].right = right;
 }
 
-/* Where the plane that cuts a body crosses each of its faces. */
+/* Where the plane that cuts an occluder crosses each of its faces. */
 struct cut {
-	int points[OCCLUDER_BODY_FACES];
-	double point[OCCLUDER_BODY_FACES][2][3];
+	int points[OCCLUDER_SHAPE_FACES];
+	double point[OCCLUDER_SHAPE_FACES][2][3];
 };
 
 static void note_cut(struct cut *c, int face, const double x[3])
@@ -36,7 +36,7 @@ static void note_cut(struct cut *c, int face, const double x[3])
 }
 
 /* Edges, and what is cut off them. h: heights of the corners over the plane. */
-static void put_edges(const struct occluder_set *s, const struct occluder_body *b, const double *h,
+static void put_edges(const struct occluder_set *s, const struct occluder_shape *b, const double *h,
                       struct occluder *out, struct cut *cut)
 {
 	for (uint32_t i = 0; i < b->edges; i++) {
@@ -63,10 +63,10 @@ static void put_edges(const struct occluder_set *s, const struct occluder_body *
 	}
 }
 
-int occ_occluder_make(const struct occluder_set *s, uint32_t body, const struct facet *f,
+int occ_occluder_make(const struct occluder_set *s, uint32_t occluder, const struct facet *f,
                       struct occluder *out)
 {
-	const struct occluder_body *b = &s->body[body];
+	const struct occluder_shape *b = &s->occluder[occluder];
 	struct cut cut = { { 0 }, { { { 0 } } } };
 	double h[OCCLUDER_CORNERS], along[3];
 
@@ -100,7 +100,7 @@ int occ_occluder_make(const struct occluder_set *s, uint32_t body, const struct 
 
 /* ---- what it hides ---- */
 
-/* Does the segment from p to q meet the blocker? */
+/* Does the segment from p to q meet the occluder? */
 static int cuts_flat(const struct occluder *b, const double p[3], const double q[3], double near)
 {
 	const struct plane *plane = &b->face[0];

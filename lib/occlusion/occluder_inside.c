@@ -9,7 +9,7 @@
 struct inside {
 	const struct polygons *p;
 	const struct solid *s;
-	struct plane face[OCCLUDER_BODY_FACES];
+	struct plane face[OCCLUDER_SHAPE_FACES];
 	int faces;
 	double lo[3], hi[3];
 	uint32_t found[INSIDERS];
@@ -58,15 +58,15 @@ static int box_apart(const struct inside *in, const struct polygon *q)
 /* The corners of a polygon that are left behind a plane, in place. */
 static int clip(double (*v)[3], int n, const struct plane *p, double near)
 {
-	double kept[FLAT_CORNERS + OCCLUDER_BODY_FACES][3];
+	double kept[FLAT_CORNERS + OCCLUDER_SHAPE_FACES][3];
 	int m = 0;
 
 	for (int i = 0; i < n; i++) {
 		const double *a = v[i], *b = v[(i + 1) % n];
 		double ha = occ_plane_height(p, a) + near, hb = occ_plane_height(p, b) + near;
-		if (ha <= 0 && m < FLAT_CORNERS + OCCLUDER_BODY_FACES)
+		if (ha <= 0 && m < FLAT_CORNERS + OCCLUDER_SHAPE_FACES)
 			memcpy(kept[m++], a, sizeof *kept);
-		if (((ha < 0 && hb > 0) || (ha > 0 && hb < 0)) && m < FLAT_CORNERS + OCCLUDER_BODY_FACES)
+		if (((ha < 0 && hb > 0) || (ha > 0 && hb < 0)) && m < FLAT_CORNERS + OCCLUDER_SHAPE_FACES)
 			geo_edge_divide(a, ha, b, hb, kept[m++]);
 	}
 	memcpy(v, kept, (size_t)m * sizeof *kept);
@@ -76,7 +76,7 @@ static int clip(double (*v)[3], int n, const struct plane *p, double near)
 /* 0: a polygon has no part in the interior, 1: some, 2: all of it is in the solid. */
 static int part_inside(const struct inside *in, const struct polygon *q)
 {
-	double v[FLAT_CORNERS + OCCLUDER_BODY_FACES][3], near = in->p->near;
+	double v[FLAT_CORNERS + OCCLUDER_SHAPE_FACES][3], near = in->p->near;
 	int n = (int)q->n, whole = 1;
 
 	for (int i = 0; i < n; i++)

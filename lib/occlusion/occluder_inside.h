@@ -4,6 +4,8 @@
 
 #include "lib/occlusion/occluder_solids.h"
 
+/* Polygons, a count: a solid with more inside stays its faces, since they are compared pair by
+ * pair. A guess. */
 enum { INSIDERS = 64 };
 
 /* 1 if a solid may stand for its faces: if what is seen inside it is between places that

@@ -9,9 +9,21 @@
 #include "lib/geometry/weld.h"
 #include "lib/occlusion/facet_set.h"
 
-/* Heights up to this fraction of the scene count as on a plane: what float32 does to
- * positions. */
+/* Heights up to this fraction of the diagonal of the scene count as on a plane: what float32,
+ * which glTF stores positions in, does to them (1.2e-7 between neighbours, and twice rounded
+ * by a node's transform). */
 static const double near_fraction = 2e-7;
+
+/* Sines up to this are no turn of an outline: what float32 leaves of a straight edge. */
+static const double straight = 1e-7;
+
+/* A chain of triangles, each within `near` of the plane of the last, may bend away from that of
+ * the first: so many times `near` it may, a guess. */
+static const double flat_most = 4;
+
+/* Cosine of the angle up to which two triangles in one plane continue one another: anything that
+ * tells 0 from 180 degrees (a fold). */
+static const double unfolded = .5;
 
 struct merger {
 	const struct model *m;
@@ -39,7 +51,8 @@ static int weld(struct merger *g)
 	v3_sub(hi, lo, diagonal);
 	p->near = near_fraction * v3_length(diagonal);
 	tolerance = p->near;
-	struct weld w = { m->vertices, m->vertex, group, 1, &tolerance, m->triangle.n, m->triangle.corner };
+	struct weld w = { m->vertices, m->vertex, group, 1, &tolerance, m->triangle.n,
+	                  m->triangle.corner };
 	bad = bad || geo_weld_points(&w, id, &p->points, g->e);
 	p->point = bad ? NULL : mem_new(p->points, 3 * sizeof *p->point, "points", g->e);
 	bad = bad || !p->point;
@@ -79,7 +92,7 @@ static void join(struct merger *g, uint32_t edge)
 	struct plane p = plane_of(g, t), q = plane_of(g, u);
 	double a = occ_plane_height(&p, at(g, geo_half_edge_apex(g->triangle, use[1])));
 	double b = occ_plane_height(&q, at(g, geo_half_edge_apex(g->triangle, use[0])));
-	if (v3_dot(p.normal, q.normal) > .5 && fabs(a) <= g->p->near && fabs(b) <= g->p->near)
+	if (v3_dot(p.normal, q.normal) > unfolded && fabs(a) <= g->p->near && fabs(b) <= g->p->near)
 		geo_sets_join(g->set, t, u);
 }
 
@@ -119,7 +132,7 @@ static int outer(const struct merger *g, uint32_t half)
  * them; 0 otherwise. Leaves g->next cleared. */
 static uint32_t outline(struct merger *g, const uint32_t *tri, size_t n, uint32_t *corner)
 {
-	size_t halves = 0, seen = 0;
+	size_t halves = 0, walked = 0;
 	uint32_t first = UINT32_MAX, count = 0, simple = 1;
 	struct plane p = plane_of(g, tri[0]);
 
@@ -132,24 +145,25 @@ static uint32_t outline(struct merger *g, const uint32_t *tri, size_t n, uint32_
 		g->next[first] = geo_half_edge_to(g->triangle, half);
 		halves++;
 	}
-	for (uint32_t a = first, b; simple && seen < halves; a = b, seen++) {
+	for (uint32_t a = first, b; simple && walked < halves; a = b, walked++) {
 		b = g->next[a];
 		uint32_t c = b == UINT32_MAX ? b : g->next[b];
-		if (c == UINT32_MAX || (seen && a == first))
+		if (c == UINT32_MAX || (walked && a == first))
 			break;
 		double u[3], v[3], turn[3];
 		v3_sub(at(g, b), at(g, a), u);
 		v3_sub(at(g, c), at(g, b), v);
 		v3_cross(u, v, turn);
 		double sine = v3_dot(turn, p.normal) / (v3_length(u) * v3_length(v));
-		if (sine < -1e-7 || (sine < 1e-7 && v3_dot(u, v) < 0) || count == FLAT_CORNERS)
+		if (sine < -straight || (sine < straight && v3_dot(u, v) < 0) ||
+		    count == FLAT_CORNERS)
 			break;
-		if (sine >= 1e-7)
+		if (sine >= straight)
 			corner[count++] = b;
 	}
 	for (size_t i = 0; i < 3 * n; i++)
 		g->next[g->triangle[3 * tri[i / 3] + i % 3]] = UINT32_MAX;
-	return seen == halves && count >= 3 ? count : 0;
+	return walked == halves && count >= 3 ? count : 0;
 }
 
 /* Are all corners of the set in one plane? Joining compared neighbours only. */
@@ -158,7 +172,8 @@ static int flat(const struct merger *g, const uint32_t *tri, size_t n)
 	struct plane p = plane_of(g, tri[0]);
 
 	for (size_t i = 0; i < 3 * n; i++)
-		if (fabs(occ_plane_height(&p, at(g, g->triangle[3 * tri[i / 3] + i % 3]))) > 4 * g->p->near)
+		if (fabs(occ_plane_height(&p, at(g, g->triangle[3 * tri[i / 3] + i % 3]))) >
+		    flat_most * g->p->near)
 			return 0;
 	return 1;
 }
@@ -172,8 +187,8 @@ static int has_back(const struct merger *g, uint32_t triangle)
 
 static int put_set(struct merger *g, const uint32_t *tri, size_t n)
 {
-	uint32_t corner[FLAT_CORNERS], count = n > 1 && flat(g, tri, n) ? outline(g, tri, n, corner) : 0;
-
+	uint32_t corner[FLAT_CORNERS];
+	uint32_t count = n > 1 && flat(g, tri, n) ? outline(g, tri, n, corner) : 0;
 	int two_sided = 0;
 
 	for (size_t i = 0; i < n; i++)

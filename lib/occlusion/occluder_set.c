@@ -9,6 +9,8 @@
 #include "lib/occlusion/occluder_inside.h"
 #include "lib/occlusion/occluder_polygons.h"
 
+/* Occluders in a leaf of the tree, a count: testing a box costs about as much as testing that of an
+ * occluder. A guess. */
 enum { LEAF = 2 };
 
 struct maker {
@@ -19,13 +21,13 @@ struct maker {
 	uint32_t *order;              /* polygons by group */
 	uint32_t *first_side;         /* [polygons+1] edges by group of their polygon */
 	struct side *group_side;
-	struct array body, corner, edge, face;
+	struct array occluder, corner, edge, face;
 	struct err *e;
 };
 
-/* ---- bodies ---- */
+/* ---- occluders ---- */
 
-static void bound(const struct maker *k, struct occluder_body *b)
+static void bound(const struct maker *k, struct occluder_shape *b)
 {
 	const double *x = (const double *)k->corner.data + 3 * (size_t)b->corner;
 
@@ -41,13 +43,13 @@ static void bound(const struct maker *k, struct occluder_body *b)
 	}
 }
 
-static void begin_body(const struct maker *k, struct occluder_body *b)
+static void begin_shape(const struct maker *k, struct occluder_shape *b)
 {
-	*b = (struct occluder_body){ .corner = (uint32_t)k->corner.n / 3, .edge = (uint32_t)k->edge.n,
+	*b = (struct occluder_shape){ .corner = (uint32_t)k->corner.n / 3, .edge = (uint32_t)k->edge.n,
 	                    .face = (uint32_t)k->face.n };
 }
 
-static int end_body(struct maker *k, struct occluder_body *b)
+static int end_shape(struct maker *k, struct occluder_shape *b)
 {
 	const double *x = k->corner.data;
 
@@ -60,7 +62,7 @@ static int end_body(struct maker *k, struct occluder_body *b)
 		v3_normalise(e->along);
 	}
 	bound(k, b);
-	return mem_append(&k->body, b, 1, sizeof *b, k->e);
+	return mem_append(&k->occluder, b, 1, sizeof *b, k->e);
 }
 
 /* Does a plane have the whole scene on one side? Then it can only be touched. */
@@ -87,11 +89,11 @@ static int all_on_hull(const struct polygons *p, const struct solid *s)
 static int put_flat(struct maker *k, uint32_t polygon)
 {
 	const struct polygon *q = (const struct polygon *)k->p.polygon.data + polygon;
-	struct occluder_body b;
+	struct occluder_shape b;
 
 	if (on_hull(&k->p, &q->plane))
 		return 0;
-	begin_body(k, &b);
+	begin_shape(k, &b);
 	b.flat = 1;
 	for (uint32_t i = 0; i < q->n; i++) {
 		struct occluder_edge edge = { .a = b.corner + i, .b = b.corner + (i + 1) % q->n };
@@ -99,11 +101,11 @@ static int put_flat(struct maker *k, uint32_t polygon)
 		    mem_append(&k->edge, &edge, 1, sizeof edge, k->e))
 			return -1;
 	}
-	return mem_append(&k->face, &q->plane, 1, sizeof q->plane, k->e) || end_body(k, &b);
+	return mem_append(&k->face, &q->plane, 1, sizeof q->plane, k->e) || end_shape(k, &b);
 }
 
-/* The number of a point in a body under way, added if it is new. */
-static int body_corner(struct maker *k, const struct occluder_body *b, uint32_t *known, uint32_t *n,
+/* The number of a point in an occluder under way, added if it is new. */
+static int shape_corner(struct maker *k, const struct occluder_shape *b, uint32_t *known, uint32_t *n,
                        uint32_t point, uint32_t *corner)
 {
 	uint32_t i = 0;
@@ -129,10 +131,10 @@ static uint16_t face_number(const struct solid *s, uint32_t polygon)
 static int put_solid(struct maker *k, const struct solid *s)
 {
 	const struct polygon *poly = k->p.polygon.data;
-	uint32_t known[2 * OCCLUDER_BODY_EDGES * 2], n = 0;
-	struct occluder_body b;
+	uint32_t known[2 * OCCLUDER_SHAPE_EDGES * 2], n = 0;
+	struct occluder_shape b;
 
-	begin_body(k, &b);
+	begin_shape(k, &b);
 	for (size_t i = 0; i < s->polygons; i++)
 		if (mem_append(&k->face, &poly[s->polygon[i]].plane, 1, sizeof(struct plane), k->e))
 			return -1;
@@ -145,13 +147,13 @@ static int put_solid(struct maker *k, const struct solid *s)
 		                          .right = (uint16_t)s->polygons };
 		if (pair)
 			edge.right = face_number(s, x[1].polygon);
-		if (body_corner(k, &b, known, &n, x->low, &edge.a) ||
-		    body_corner(k, &b, known, &n, x->high, &edge.b) ||
+		if (shape_corner(k, &b, known, &n, x->low, &edge.a) ||
+		    shape_corner(k, &b, known, &n, x->high, &edge.b) ||
 		    mem_append(&k->edge, &edge, 1, sizeof edge, k->e))
 			return -1;
 		i += (size_t)pair;
 	}
-	return end_body(k, &b);
+	return end_shape(k, &b);
 }
 
 static int put_group(struct maker *k, const uint32_t *polygon, size_t n)
@@ -184,10 +186,10 @@ static void sort_sides(struct maker *k, size_t polygons)
 	k->first_side[0] = 0;
 }
 
-static int put_bodies(struct maker *k)
+static int put_occluders(struct maker *k)
 {
 	size_t n = k->p.polygon.n, at = 0;
-	uint32_t *next = mem_new(n + 1, sizeof *next, "bodies", k->e);
+	uint32_t *next = mem_new(n + 1, sizeof *next, "occluders", k->e);
 
 	if (!next)
 		return -1;
@@ -214,7 +216,7 @@ static int put_bodies(struct maker *k)
 
 static int by_centre(const void *a, const void *b, int axis)
 {
-	const struct occluder_body *x = a, *y = b;
+	const struct occluder_shape *x = a, *y = b;
 
 	if (x->centre[axis] != y->centre[axis])
 		return x->centre[axis] < y->centre[axis] ? -1 : 1;
@@ -225,7 +227,7 @@ static int by_centre_x(const void *a, const void *b) { return by_centre(a, b, 0)
 static int by_centre_y(const void *a, const void *b) { return by_centre(a, b, 1); }
 static int by_centre_z(const void *a, const void *b) { return by_centre(a, b, 2); }
 
-/* Halves the bodies along the longest side of their box until few are left. */
+/* Halves the occluders along the longest side of their box until few are left. */
 static void grow(struct occluder_set *s, uint32_t first, uint32_t count)
 {
 	static int (*const by_axis[3])(const void *, const void *) = { by_centre_x, by_centre_y,
@@ -238,15 +240,15 @@ static void grow(struct occluder_set *s, uint32_t first, uint32_t count)
 		n->lo[d] = INFINITY;
 		n->hi[d] = -INFINITY;
 		for (uint32_t i = first; i < first + count; i++) {
-			n->lo[d] = fmin(n->lo[d], s->body[i].lo[d]);
-			n->hi[d] = fmax(n->hi[d], s->body[i].hi[d]);
+			n->lo[d] = fmin(n->lo[d], s->occluder[i].lo[d]);
+			n->hi[d] = fmax(n->hi[d], s->occluder[i].hi[d]);
 		}
 		if (n->hi[d] - n->lo[d] > n->hi[axis] - n->lo[axis])
 			axis = d;
 	}
 	if (count <= LEAF)
 		return;
-	qsort(s->body + first, count, sizeof *s->body, by_axis[axis]);
+	qsort(s->occluder + first, count, sizeof *s->occluder, by_axis[axis]);
 	grow(s, first, count / 2);
 	n->right = (uint32_t)s->nodes;
 	grow(s, first + count / 2, count - count / 2);
@@ -254,11 +256,11 @@ static void grow(struct occluder_set *s, uint32_t first, uint32_t count)
 
 static int make_tree(struct occluder_set *s, struct err *e)
 {
-	s->node = mem_new(2 * s->bodies + 1, sizeof *s->node, "tree of bodies", e);
+	s->node = mem_new(2 * s->occluders + 1, sizeof *s->node, "tree of occluders", e);
 	if (!s->node)
 		return -1;
-	if (s->bodies)
-		grow(s, 0, (uint32_t)s->bodies);
+	if (s->occluders)
+		grow(s, 0, (uint32_t)s->occluders);
 	return 0;
 }
 
@@ -270,13 +272,13 @@ int occ_occluder_set_init(struct occluder_set *s, const struct model *m, struct 
 
 	*s = (struct occluder_set){ .near = k.p.near };
 	k.set = bad ? NULL : geo_sets_new(n, e);
-	k.order = mem_new(n, sizeof *k.order, "bodies", e);
-	k.first_side = mem_new(n + 1, sizeof *k.first_side, "bodies", e);
-	k.group_side = mem_new(k.p.corner.n, sizeof *k.group_side, "bodies", e);
+	k.order = mem_new(n, sizeof *k.order, "occluders", e);
+	k.first_side = mem_new(n + 1, sizeof *k.first_side, "occluders", e);
+	k.group_side = mem_new(k.p.corner.n, sizeof *k.group_side, "occluders", e);
 	bad = bad || !k.set || !k.order || !k.first_side || !k.group_side ||
-	      occ_solids_group(&k.p, k.set, &k.side, &k.sides, e) || put_bodies(&k);
-	s->body = k.body.data;
-	s->bodies = k.body.n;
+	      occ_solids_group(&k.p, k.set, &k.side, &k.sides, e) || put_occluders(&k);
+	s->occluder = k.occluder.data;
+	s->occluders = k.occluder.n;
 	s->corner = k.corner.data;
 	s->corners = k.corner.n / 3;
 	s->edge = k.edge.data;
@@ -294,7 +296,7 @@ int occ_occluder_set_init(struct occluder_set *s, const struct model *m, struct 
 
 void occ_occluder_set_free(struct occluder_set *s)
 {
-	free(s->body);
+	free(s->occluder);
 	free(s->corner);
 	free(s->edge);
 	free(s->face);

@@ -116,8 +116,8 @@ int occ_solid_check(const struct polygons *p, struct solid *s)
 	size_t open = missing_plane(p, s, &s->missing);
 
 	s->closed = open == 0;
-	if (s->polygons < 3 || s->polygons + 1 > OCCLUDER_BODY_FACES ||
-	    s->sides + open > 2 * OCCLUDER_BODY_EDGES)
+	if (s->polygons < 3 || s->polygons + 1 > OCCLUDER_SHAPE_FACES ||
+	    s->sides + open > 2 * OCCLUDER_SHAPE_EDGES)
 		return 0;
 	for (size_t i = 0; i < s->polygons; i++)
 		if (!all_behind(p, s, &poly[s->polygon[i]].plane))

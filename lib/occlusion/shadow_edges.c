@@ -5,16 +5,22 @@
 #include "lib/base/vec3.h"
 #include "lib/occlusion/occluder_polygons.h"
 
-/* Up to how many blockers it pays to look for bends, and where the shadows of two meet:
- * the cells between many are small anyway. */
+/* Up to how many occluders it pays to look for bends, and where the shadows of two meet, a count:
+ * the cells between many are small anyway. A guess. */
 enum { FEW = 3 };
+
+/* Two planes are one if the cosine between them is as near to 1: 1e-6 radians. */
+static const double same_plane = 1e-12;
+
+/* The same of two edges that are parallel. */
+static const double same_direction = 5e-13;
 
 /* ---- cuts ---- */
 
 struct cuts {
 	const struct facet *f, *g;
 	double near;
-	int few;                      /* blockers: it pays to look for more than edges */
+	int few;                      /* occluders: it pays to look for more than edges */
 	struct shadows *s;
 };
 
@@ -31,7 +37,7 @@ static int side_of(const struct plane *p, const double *x, int n, double near)
 	return above - below;
 }
 
-static int blocker_side(const struct occluder *b, const struct plane *p, double near)
+static int occluder_side(const struct occluder *b, const struct plane *p, double near)
 {
 	return side_of(p, b->corner[0], b->corners, near);
 }
@@ -39,7 +45,7 @@ static int blocker_side(const struct occluder *b, const struct plane *p, double 
 static void add(const struct cuts *c, struct shadow_cuts *s, const struct plane *p, uint64_t of)
 {
 	for (int i = 0; i < s->n; i++)
-		if (fabs(fabs(v3_dot(s->cut[i].normal, p->normal)) - 1) < 1e-12 &&
+		if (fabs(fabs(v3_dot(s->cut[i].normal, p->normal)) - 1) < same_plane &&
 		    fabs(fabs(s->cut[i].offset) - fabs(p->offset)) < c->near) {
 			s->of[i] |= of;
 			return;
@@ -57,9 +63,9 @@ static void turn_round(struct plane *p)
 	p->offset = -p->offset;
 }
 
-/* A plane through an edge of a blocker and a corner of f or g, or the reverse: where it
- * cuts f, it may end a shadow; where it has the blocker on one side and both facets on the
- * other, the blocker does nothing. `kink`: the edge has a parallel one. */
+/* A plane through an edge of an occluder and a corner of f or g, or the reverse: where it
+ * cuts f, it may end a shadow; where it has the occluder on one side and both facets on the
+ * other, the occluder does nothing. `kink`: the edge has a parallel one. */
 static void consider(struct cuts *c, const struct occluder *b, int number, struct plane *p,
                      int kink)
 {
@@ -69,7 +75,7 @@ static void consider(struct cuts *c, const struct occluder *b, int number, struc
 
 	if (of_f && of_f != of_g)
 		return;
-	int of_b = of_g || c->few ? blocker_side(b, p, c->near) : 0;
+	int of_b = of_g || c->few ? occluder_side(b, p, c->near) : 0;
 	if (of_f) {
 		s->idle |= (uint64_t)(of_b == -of_f) << number;
 		return;
@@ -82,7 +88,7 @@ static void consider(struct cuts *c, const struct occluder *b, int number, struc
 		return;
 	if (of_b < 0)
 		turn_round(p);
-	s->blocker[s->limits] = number;
+	s->occluder[s->limits] = number;
 	s->limit[s->limits++] = *p;
 }
 
@@ -107,10 +113,10 @@ static int plane_through(const double a[3], const double along[3], const double 
 /* Of unit vectors. */
 static int parallel(const double a[3], const double b[3])
 {
-	return fabs(v3_dot(a, b)) >= 1 - 5e-13;
+	return fabs(v3_dot(a, b)) >= 1 - same_direction;
 }
 
-/* Bits of a blocker's faces that a point is surely in front of, and behind. */
+/* Bits of an occluder's faces that a point is surely in front of, and behind. */
 struct faces {
 	uint64_t front, behind;
 };
@@ -127,7 +133,7 @@ static struct faces faces_from(const struct occluder *b, const double x[3], doub
 	return f;
 }
 
-/* Is an edge inside the blocker's silhouette as seen from a point? So it is, then, for
+/* Is an edge inside the occluder's silhouette as seen from a point? So it is, then, for
  * all that see it in line with that point. */
 static int within(const struct occluder *b, int edge, struct faces f)
 {
@@ -136,8 +142,8 @@ static int within(const struct occluder *b, int edge, struct faces f)
 	return !b->flat && ((f.front & both) == both || (f.behind & both) == both);
 }
 
-/* Does a face of the blocker have both facets in front of it, or an edge's plane through a
- * corner of f the blocker on one side and them on the other? */
+/* Does a face of the occluder have both facets in front of it, or an edge's plane through a
+ * corner of f the occluder on one side and them on the other? */
 static void find_idle(struct cuts *c, const struct occluder *b, int number)
 {
 	struct plane p;
@@ -160,7 +166,7 @@ static void find_idle(struct cuts *c, const struct occluder *b, int number)
 	}
 }
 
-/* The corners of a blocker that are first and last as a plane turns about an edge of g, from
+/* The corners of an occluder that are first and last as a plane turns about an edge of g, from
  * its outside to its inside. */
 static void first_and_last(const struct cuts *c, const struct occluder *b, int edge,
                            const double along[3], int found[2])
@@ -183,7 +189,7 @@ static void first_and_last(const struct cuts *c, const struct occluder *b, int e
 	}
 }
 
-/* Planes through an edge of g and corners of a blocker: those that have it on one side, or
+/* Planes through an edge of g and corners of an occluder: those that have it on one side, or
  * all. */
 static void corner_cuts(struct cuts *c, const struct occluder *b, int number, int edge,
                         const double along[3])
@@ -204,7 +210,7 @@ static void corner_cuts(struct cuts *c, const struct occluder *b, int number, in
 			consider(c, b, number, &p, 0);
 }
 
-static void blocker_cuts(struct cuts *c, const struct occluder *b, int number)
+static void occluder_cuts(struct cuts *c, const struct occluder *b, int number)
 {
 	const struct facet *g = c->g;
 	double along[3];
@@ -223,7 +229,7 @@ static void blocker_cuts(struct cuts *c, const struct occluder *b, int number)
 	}
 }
 
-/* Planes through parallel edges of two blockers with one on each side: the gap between them
+/* Planes through parallel edges of two occluders with one on each side: the gap between them
  * opens there. */
 static void gap_cuts(struct cuts *c, const struct occluder *a, const struct occluder *b, uint64_t of)
 {
@@ -235,12 +241,12 @@ static void gap_cuts(struct cuts *c, const struct occluder *a, const struct occl
 			if (parallel(a->edge[i].along, b->edge[j].along) && !within(a, i, of_x) &&
 			    plane_through(a->edge[i].a, a->edge[i].along, b->edge[j].a, c->near, &p) &&
 			    !side_of(&p, c->f->v, c->f->n, c->near) &&
-			    blocker_side(a, &p, c->near) * blocker_side(b, &p, c->near) < 0)
+			    occluder_side(a, &p, c->near) * occluder_side(b, &p, c->near) < 0)
 				add(c, &c->s->edges, &p, of);
 	}
 }
 
-/* Planes through an edge of one blocker and a corner of another with each on one side:
+/* Planes through an edge of one occluder and a corner of another with each on one side:
  * their shadows meet there, or part. */
 static void meeting_cuts(struct cuts *c, const struct occluder *a, const struct occluder *b,
                          uint64_t of)
@@ -254,37 +260,37 @@ static void meeting_cuts(struct cuts *c, const struct occluder *a, const struct 
 			    !plane_through(a->edge[i].a, a->edge[i].along, b->corner[j], c->near, &p) ||
 			    side_of(&p, c->f->v, c->f->n, c->near))
 				continue;
-			int side = blocker_side(a, &p, c->near);
-			side *= side ? blocker_side(b, &p, c->near) : 0;
+			int side = occluder_side(a, &p, c->near);
+			side *= side ? occluder_side(b, &p, c->near) : 0;
 			if (side)
 				add(c, side < 0 ? &c->s->edges : &c->s->bends, &p, of);
 		}
 	}
 }
 
-void occ_shadow_edges(const struct occluder *b, int blockers, const struct facet *f,
+void occ_shadow_edges(const struct occluder *b, int occluders, const struct facet *f,
                       const struct facet *g, double near, struct shadows *s)
 {
-	struct cuts c = { f, g, near, blockers <= FEW, s };
+	struct cuts c = { f, g, near, occluders <= FEW, s };
 
 	s->edges.n = s->bends.n = s->limits = 0;
 	s->idle = 0;
-	for (int i = 0; i < blockers; i++) {
+	for (int i = 0; i < occluders; i++) {
 		find_idle(&c, &b[i], i);
-		blocker_cuts(&c, &b[i], i);
+		occluder_cuts(&c, &b[i], i);
 	}
-	for (int i = 0; i < blockers && s->edges.n < SHADOW_CUTS; i++)
+	for (int i = 0; i < occluders && s->edges.n < SHADOW_CUTS; i++)
 		for (int j = 0; j < i; j++)
 			gap_cuts(&c, &b[i], &b[j], (uint64_t)1 << i | (uint64_t)1 << j);
-	for (int i = 0; c.few && i < blockers; i++)
-		for (int j = 0; j < blockers; j++)
+	for (int i = 0; c.few && i < occluders; i++)
+		for (int j = 0; j < occluders; j++)
 			if (j != i)
 				meeting_cuts(&c, &b[i], &b[j], (uint64_t)1 << i | (uint64_t)1 << j);
 }
 
 /* ---- cells ---- */
 
-/* Is the blocker beyond one of the planes that hold both facets behind them? */
+/* Is the occluder beyond one of the planes that hold both facets behind them? */
 static int outside(const struct occluder *b, const struct plane *shaft, int planes, double near)
 {
 	for (int p = 0; p < planes; p++) {
@@ -305,9 +311,9 @@ uint64_t occ_shadow_on(const struct occluder *b, const struct shadows *s, uint64
 
 	*hidden = 0;
 	for (int i = 0; i < s->limits; i++)
-		if (left >> s->blocker[i] & 1 &&
+		if (left >> s->occluder[i] & 1 &&
 		    side_of(&s->limit[i], cell->v, cell->n, near) < 0)
-			left &= ~((uint64_t)1 << s->blocker[i]);
+			left &= ~((uint64_t)1 << s->occluder[i]);
 	/* Where the limits of shadows are known they say as much. */
 	int planes = left && !s->limits ? occ_shaft_planes(cell, g, near, shaft) : 0;
 	for (uint64_t i = left; i; i &= i - 1) {

@@ -6,6 +6,9 @@
 #include "lib/base/vec3.h"
 #include "lib/occlusion/occluder_polygons.h"
 
+/* A box is flat up to so many times the height that counts as none. A guess. */
+static const double flat_box = 4;
+
 /* ---- the shaft between two facets ---- */
 
 static void grow_box(struct shaft *l, const struct facet *f)
@@ -65,10 +68,10 @@ int occ_shaft_planes(const struct facet *f, const struct facet *g, double near,
 	return n + edge_planes(g, f, near, shaft + n);
 }
 
-/* ---- bodies in it ---- */
+/* ---- occluders in it ---- */
 
-/* Can nothing of a body be between? All of it on or behind a facet's plane. */
-static int behind_facet(const struct occluder_set *s, const struct occluder_body *b, const struct facet *f)
+/* Is all of an occluder on or behind a facet's plane, so that it hides nothing? */
+static int behind_facet(const struct occluder_set *s, const struct occluder_shape *b, const struct facet *f)
 {
 	const double *x = &s->corner[3 * (size_t)b->corner];
 
@@ -79,7 +82,7 @@ static int behind_facet(const struct occluder_set *s, const struct occluder_body
 }
 
 /* Is a facet in a solid, or a part of its faces, as a whole? */
-static int holds(const struct occluder_set *s, const struct occluder_body *b, const struct facet *f)
+static int holds(const struct occluder_set *s, const struct occluder_shape *b, const struct facet *f)
 {
 	for (uint32_t i = 0; i < b->faces && !b->flat; i++)
 		for (int c = 0; c < f->n; c++)
@@ -88,7 +91,7 @@ static int holds(const struct occluder_set *s, const struct occluder_body *b, co
 	return !b->flat;
 }
 
-static int outside_shaft(const struct shaft *l, const struct occluder_body *b)
+static int outside_shaft(const struct shaft *l, const struct occluder_shape *b)
 {
 	const double *x = &l->set->corner[3 * (size_t)b->corner];
 
@@ -111,7 +114,7 @@ static int apart(const struct shaft *l, const double lo[3], const double hi[3])
 			/* A flat box may lie in the shaft's flat box. */
 			if (lo[k] > l->hi[k] + near || hi[k] < l->lo[k] - near)
 				return 1;
-			if (l->hi[k] - l->lo[k] > 4 * near)
+			if (l->hi[k] - l->lo[k] > flat_box * near)
 				return 1;
 		}
 	return 0;
@@ -141,12 +144,12 @@ static int box_outside(const struct shaft *l, const double lo[3], const double h
 	return 0;
 }
 
-/* Bodies that the box and the planes of both facets do not rule out. 0 if there are too
+/* Occluders that the box and the planes of both facets do not rule out. 0 if there are too
  * many. */
 static int collect(struct shaft *l)
 {
 	const struct occluder_set *s = l->set;
-	uint32_t stack[64], depth = 0;
+	uint32_t stack[64], depth = 0; /* the tree halves: 33 wait at most */
 
 	if (s->nodes)
 		stack[depth++] = 0;
@@ -161,7 +164,7 @@ static int collect(struct shaft *l)
 			continue;
 		}
 		for (uint32_t i = n->first; i < n->first + n->count; i++) {
-			const struct occluder_body *b = &s->body[i];
+			const struct occluder_shape *b = &s->occluder[i];
 			if (apart(l, b->lo, b->hi))
 				continue;
 			if (!l->planes)
@@ -170,21 +173,21 @@ static int collect(struct shaft *l)
 			    behind_facet(s, b, l->b) || (holds(s, b, l->a) && holds(s, b, l->b)) ||
 			    outside_shaft(l, b))
 				continue;
-			if (l->bodies == l->most)
+			if (l->occluders == l->most)
 				return 0;
-			l->body[l->bodies++] = i;
+			l->occluder[l->occluders++] = i;
 		}
 	}
 	return 1;
 }
 
-/* Does one of the bodies hide everything? */
+/* Does one of the occluders hide everything? */
 static int one_hides(const struct shaft *l)
 {
 	struct occluder b;
 
-	for (int i = 0; i < l->bodies; i++)
-		if (occ_occluder_make(l->set, l->body[i], l->b, &b) &&
+	for (int i = 0; i < l->occluders; i++)
+		if (occ_occluder_make(l->set, l->occluder[i], l->b, &b) &&
 		    occ_occluder_hides(&b, l->a, l->b, l->set->near))
 			return 1;
 	return 0;
@@ -196,9 +199,9 @@ enum shaft_state occ_shaft_cull(struct shaft *l, const struct occluder_set *set,
 	l->set = set;
 	l->a = a;
 	l->b = b;
-	l->planes = l->bodies = 0;
+	l->planes = l->occluders = 0;
 	if (!set->nodes)
-		return SHAFT_CLEAR;
+		return SHAFT_UNOCCLUDED;
 	for (int k = 0; k < 3; k++) {
 		l->lo[k] = INFINITY;
 		l->hi[k] = -INFINITY;
@@ -208,5 +211,5 @@ enum shaft_state occ_shaft_cull(struct shaft *l, const struct occluder_set *set,
 	int all = collect(l);
 	if (one_hides(l))
 		return SHAFT_HIDDEN;
-	return !all ? SHAFT_CROWDED : l->bodies ? SHAFT_PARTLY : SHAFT_CLEAR;
+	return !all ? SHAFT_CROWDED : l->occluders ? SHAFT_PARTLY : SHAFT_UNOCCLUDED;
 }

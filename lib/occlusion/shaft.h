@@ -4,13 +4,16 @@
 
 #include "lib/occlusion/occluder.h"
 
+/* Occluders, a count: more are a crowd, where formulas cost more than the rays that replace them;
+ * at most the 64 bits of those who keep a set of them. A guess. Planes: one for each edge of
+ * either facet at most. */
 enum { SHAFT_OCCLUDERS = 48, SHAFT_PLANES = 2 * FACET_CORNERS };
 
 enum shaft_state {
-	SHAFT_CLEAR,          /* nothing: every point of one sees every point of the other */
-	SHAFT_HIDDEN,           /* one body hides all of one from all of the other */
-	SHAFT_PARTLY,           /* the blockers listed may hide something */
-	SHAFT_CROWDED         /* more blockers than the list holds */
+	SHAFT_UNOCCLUDED,     /* nothing: every point of one sees every point of the other */
+	SHAFT_HIDDEN,         /* one occluder hides all of one from all of the other */
+	SHAFT_PARTLY,         /* the occluders listed may hide something */
+	SHAFT_CROWDED         /* more occluders than the list holds */
 };
 
 struct shaft {
@@ -19,12 +22,13 @@ struct shaft {
 	struct plane shaft[SHAFT_PLANES];
 	int planes;
 	double lo[3], hi[3];      /* box of both */
-	uint32_t body[SHAFT_OCCLUDERS];
-	int bodies, most;         /* most: how many are let in before it is a crowd */
+	uint32_t occluder[SHAFT_OCCLUDERS];
+	int occluders, most;      /* most: how many are let in before it is a crowd */
 };
 
 /* Looks from a to b, which lie in front of one another; l->most is set. With SHAFT_PARTLY the
- * bodies that may hide something are in l->body. O(log bodies + bodies between x corners). */
+ * occluders that may hide something are in l->occluder.
+ * O(log occluders + occluders between x corners). */
 enum shaft_state occ_shaft_cull(struct shaft *l, const struct occluder_set *set, const struct facet *a,
                           const struct facet *b);
 

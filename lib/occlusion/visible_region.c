@@ -5,23 +5,29 @@
 #include "lib/base/vec3.h"
 #include "lib/occlusion/occluder_polygons.h"
 
-/* Up to how many blockers that hide parts of a polygon what they hide is taken off, and
- * what they hide together added again; else it is cut up. Only where the measure is exact. */
+/* Up to how many occluders that hide parts of a polygon what they hide is taken off, and what they
+ * hide together added again (2^n - 1 measures); else it is cut up. A count, a guess. Only
+ * where the measure is exact. */
 enum { OVERLAPS = 3 };
 
-/* Heights are rounded to this, by the size of what is multiplied. What is seen, too. */
+/* Heights are rounded to this, by the size of what is multiplied; what is visible, too. Some
+ * fifty roundings of 2e-16. */
 static const double rounding = 1e-14;
 
-void occ_visible_begin(struct visible_point *s, int blockers, double near)
+/* An eye is in front of a face from this part of `near` on: behind it by rounding is not in the
+ * solid. A guess. */
+static const double in_front_from = 1e-6;
+
+void occ_visible_begin(struct visible_point *s, int occluders, double near)
 {
 	s->near = near;
-	for (int i = 0; i < blockers; i++)
+	for (int i = 0; i < occluders; i++)
 		s->outline[i].front = 0;
 }
 
 /* ---- silhouettes ---- */
 
-/* Bits of the faces that the eye is in front of; bit 1 for a flat blocker seen from behind. */
+/* Bits of the faces that the eye is in front of; bit 1 for a flat occluder seen from behind. */
 static uint64_t faces_in_front(const struct occluder *b, const double x[3], double near)
 {
 	uint64_t front = 0;
@@ -31,7 +37,7 @@ static uint64_t faces_in_front(const struct occluder *b, const double x[3], doub
 		return h > 0 ? 1 : h < 0 ? 2 : 0;
 	}
 	for (int i = 0; i < b->faces; i++)
-		front |= (uint64_t)(occ_plane_height(&b->face[i], x) > near * 1e-6) << i;
+		front |= (uint64_t)(occ_plane_height(&b->face[i], x) > near * in_front_from) << i;
 	return front;
 }
 
@@ -40,14 +46,14 @@ static uint64_t faces_in_front(const struct occluder *b, const double x[3], doub
 static void towards_eye(const struct occluder *b, int edge, uint64_t front, double to[3])
 {
 	int left = b->edge[edge].left, right = b->edge[edge].right;
-	const double *seen = b->face[front >> left & 1 ? left : right].normal;
+	const double *in_front = b->face[front >> left & 1 ? left : right].normal;
 	const double *other = b->face[front >> left & 1 ? right : left].normal;
 
 	for (int k = 0; k < 3; k++)
-		to[k] = !b->flat ? seen[k] - other[k] : front & 1 ? seen[k] : -seen[k];
+		to[k] = !b->flat ? in_front[k] - other[k] : front & 1 ? in_front[k] : -in_front[k];
 }
 
-/* Appends an edge, so that the blocker is inside. */
+/* Appends an edge, so that the occluder is inside. */
 static void put_edge(struct outline *o, const struct occluder *b, int edge)
 {
 	double to[3], d[3], across[3], inwards[3];
@@ -100,12 +106,12 @@ static void find_planes(const struct outline *o, const double x[3], struct outli
 	}
 }
 
-/* The planes of a blocker for the eye in work. -1 if the eye is in it, 0 if it is seen
+/* The planes of an occluder for the eye in work. -1 if the eye is in it, 0 if it is seen
  * edge-on. */
-static int know_planes(struct visible_point *s, int blocker, const double x[3])
+static int update_planes(struct visible_point *s, int number, const double x[3])
 {
-	const struct occluder *b = &s->occluder[blocker];
-	struct outline *o = &s->outline[blocker];
+	const struct occluder *b = &s->occluder[number];
+	struct outline *o = &s->outline[number];
 	uint64_t front = faces_in_front(b, x, s->near);
 
 	if (!front)
@@ -114,11 +120,11 @@ static int know_planes(struct visible_point *s, int blocker, const double x[3])
 		s->full = 1;
 		return 0;
 	}
-	find_planes(o, x, &s->planes[blocker]);
+	find_planes(o, x, &s->planes[number]);
 	return 1;
 }
 
-/* ---- what blockers hide ---- */
+/* ---- what occluders hide ---- */
 
 /* What of a polygon is in front of planes through the eye: bit 0 of a height of one of its
  * corners above `zero`, bit 1 below. */
@@ -134,22 +140,22 @@ static int sides_of(const struct point_polygon *p, const double n[3], double zer
 	return (above != 0) | (below != 0) << 1;
 }
 
-static void plane_of(const struct visible_point *s, int blocker, int edge, double n[3], double *zero)
+static void plane_of(const struct visible_point *s, int number, int edge, double n[3], double *zero)
 {
-	const struct outline_planes *p = &s->planes[blocker];
+	const struct outline_planes *p = &s->planes[number];
 
 	n[0] = p->x[edge], n[1] = p->y[edge], n[2] = p->z[edge];
 	*zero = rounding * s->reach * p->size[edge];
 }
 
-/* Does a blocker hide nothing of a polygon, as it is all beyond an edge? Else a bit in
+/* Does an occluder hide nothing of a polygon, as it is all beyond an edge? Else a bit in
  * *across for each edge that cuts it. */
-static int apart(const struct visible_point *s, int blocker, const struct point_polygon *p, uint64_t *across)
+static int apart(const struct visible_point *s, int number, const struct point_polygon *p, uint64_t *across)
 {
 	*across = 0;
-	for (int i = 0; i < s->outline[blocker].edges; i++) {
+	for (int i = 0; i < s->outline[number].edges; i++) {
 		double n[3], zero;
-		plane_of(s, blocker, i, n, &zero);
+		plane_of(s, number, i, n, &zero);
 		int sides = sides_of(p, n, zero);
 		if (sides == 2)
 			return 1;
@@ -158,12 +164,12 @@ static int apart(const struct visible_point *s, int blocker, const struct point_
 	return 0;
 }
 
-static int cut(struct visible_point *s, int blocker, uint64_t edges, const struct point_polygon *p,
+static int cut(struct visible_point *s, int number, uint64_t edges, const struct point_polygon *p,
                struct point_polygon *in, struct point_polygon *away)
 {
 	double n[3], zero;
 
-	plane_of(s, blocker, __builtin_ctzll(edges), n, &zero);
+	plane_of(s, number, __builtin_ctzll(edges), n, &zero);
 	s->full |= p->n >= POINT_POLYGON_CORNERS;
 	if (s->full)
 		in->n = away->n = 0;
@@ -172,8 +178,8 @@ static int cut(struct visible_point *s, int blocker, uint64_t edges, const struc
 	return in->n;
 }
 
-/* What a blocker hides of a polygon that the edges of set bits cut: of `part`, or NULL. */
-static const struct point_polygon *hidden_part(struct visible_point *s, int blocker, uint64_t edges,
+/* What an occluder hides of a polygon that the edges of set bits cut: of `part`, or NULL. */
+static const struct point_polygon *hidden_part(struct visible_point *s, int number, uint64_t edges,
                                                const struct point_polygon *p,
                                                struct point_polygon part[2])
 {
@@ -181,31 +187,31 @@ static const struct point_polygon *hidden_part(struct visible_point *s, int bloc
 	int k = 0;
 
 	for (; edges; edges &= edges - 1, p = &part[k], k = !k)
-		if (!cut(s, blocker, edges, p, &part[k], &away))
+		if (!cut(s, number, edges, p, &part[k], &away))
 			return NULL;
 	return p;
 }
 
-static double visible(struct visible_point *s, const struct point_polygon *p, const uint8_t *blockers, int n);
+static double visible(struct visible_point *s, const struct point_polygon *p, const uint8_t *occluders, int n);
 
-/* What is visible of a polygon that many blockers hide parts of: what the last one leaves,
+/* What is visible of a polygon that many occluders hide parts of: what the last one leaves,
  * piece by piece. */
 static double piecewise(struct visible_point *s, const struct point_polygon *p, uint64_t edges,
-                        const uint8_t *blockers, int n)
+                        const uint8_t *occluders, int n)
 {
 	struct point_polygon part[2], away;
 	double sum = 0;
 
 	for (int k = 0; edges && p->n; edges &= edges - 1, p = &part[k], k = !k) {
-		cut(s, blockers[n - 1], edges, p, &part[k], &away);
+		cut(s, occluders[n - 1], edges, p, &part[k], &away);
 		if (away.n)
-			sum += visible(s, &away, blockers, n - 1);
+			sum += visible(s, &away, occluders, n - 1);
 	}
 	return sum;
 }
 
-/* The form factor of what the blockers leave of a polygon. */
-static double visible(struct visible_point *s, const struct point_polygon *p, const uint8_t *blockers, int n)
+/* The form factor of what the occluders leave of a polygon. */
+static double visible(struct visible_point *s, const struct point_polygon *p, const uint8_t *occluders, int n)
 {
 	uint8_t left[SHAFT_OCCLUDERS];
 	uint64_t across[SHAFT_OCCLUDERS];
@@ -214,17 +220,17 @@ static double visible(struct visible_point *s, const struct point_polygon *p, co
 	int m = 0;
 
 	for (int i = 0; i < n; i++) {
-		if (apart(s, blockers[i], p, &across[m]))
+		if (apart(s, occluders[i], p, &across[m]))
 			continue;
 		if (!across[m]) {
-			s->hid = 1;
+			s->occluded = 1;
 			return 0;
 		}
-		left[m++] = blockers[i];
+		left[m++] = occluders[i];
 	}
 	while (m > s->overlaps) {
 		if (hidden_part(s, left[m - 1], across[m - 1], p, part)) {
-			s->hid = 1;
+			s->occluded = 1;
 			return piecewise(s, p, across[m - 1], left, m);
 		}
 		m--;
@@ -232,13 +238,13 @@ static double visible(struct visible_point *s, const struct point_polygon *p, co
 	double whole = s->measure(p, s->arg), sum = whole;
 	for (int i = 0; i < m; i++)
 		if ((hidden = hidden_part(s, left[i], across[i], p, part))) {
-			s->hid = 1;
+			s->occluded = 1;
 			sum -= visible(s, hidden, left, i);
 		}
 	return sum > rounding * whole ? sum : 0;
 }
 
-static double look(struct visible_point *s, const double x[3], const struct facet *g, uint64_t blockers,
+static double measure_visible(struct visible_point *s, const double x[3], const struct facet *g, uint64_t occluders,
                    struct err *e)
 {
 	struct point_polygon whole;
@@ -251,10 +257,10 @@ static double look(struct visible_point *s, const double x[3], const struct face
 	s->reach = 0;
 	for (int i = 0; i < whole.n; i++)
 		s->reach = fmax(s->reach, fabs(whole.x[i]) + fabs(whole.y[i]) + fabs(whole.z[i]));
-	for (uint64_t left = blockers; left; left &= left - 1) {
-		int i = __builtin_ctzll(left), known = know_planes(s, i, x);
+	for (uint64_t left = occluders; left; left &= left - 1) {
+		int i = __builtin_ctzll(left), known = update_planes(s, i, x);
 		if (known < 0) {
-			s->hid = 1;
+			s->occluded = 1;
 			return 0;
 		}
 		if (known)
@@ -263,7 +269,7 @@ static double look(struct visible_point *s, const double x[3], const struct face
 	double sum = visible(s, &whole, list, n);
 	if (!s->full)
 		return sum;
-	err_set(e, "blockers cut a polygon into one of too many corners");
+	err_set(e, "occluders cut a polygon into one of too many corners");
 	return NAN;
 }
 
@@ -273,21 +279,21 @@ static double factor(const struct point_polygon *p, void *normal)
 }
 
 double occ_visible_exchange(struct visible_point *s, const double x[3], const double normal[3], const struct facet *g,
-                            uint64_t blockers, struct err *e)
+                            uint64_t occluders, struct err *e)
 {
 	double n[3] = { normal[0], normal[1], normal[2] };
 
 	s->measure = factor;
 	s->arg = n;
 	s->overlaps = OVERLAPS;
-	return look(s, x, g, blockers, e);
+	return measure_visible(s, x, g, occluders, e);
 }
 
-double occ_visible_integrate(struct visible_point *s, const double x[3], const struct facet *g, uint64_t blockers,
+double occ_visible_integrate(struct visible_point *s, const double x[3], const struct facet *g, uint64_t occluders,
                              visible_measure measure, void *arg, struct err *e)
 {
 	s->measure = measure;
 	s->arg = arg;
 	s->overlaps = 0;
-	return look(s, x, g, blockers, e);
+	return measure_visible(s, x, g, occluders, e);
 }

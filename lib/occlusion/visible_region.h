@@ -1,4 +1,4 @@
-/* What a point sees of a facet past blockers. */
+/* What a point sees of a facet past occluders. */
 #ifndef TWOPASS_VISIBLE_REGION_H
 #define TWOPASS_VISIBLE_REGION_H
 
@@ -6,9 +6,10 @@
 #include "lib/geometry/point_polygon.h"
 #include "lib/occlusion/shaft.h"
 
+/* A count: 32 of the silhouette of a whole occluder, and as many where a plane cuts it. */
 enum { OUTLINE_EDGES = 64 };
 
-/* The silhouette of a blocker for all eyes that have the same of its faces in front. */
+/* The silhouette of an occluder for all eyes that have the same of its faces in front. */
 struct outline {
 	uint64_t front;               /* bits of those faces; 0: not known */
 	int edges;
@@ -25,11 +26,11 @@ struct outline_planes {
 /* Something additive of polygons that an eye sees. */
 typedef double (*visible_measure)(const struct point_polygon *p, void *arg);
 
-/* One thread's scratch space and the blockers. */
+/* One thread's scratch space and the occluders. */
 struct visible_point {
 	struct occluder occluder[SHAFT_OCCLUDERS];
-	double near;                  /* of the body set */
-	int hid;                      /* set when a blocker hides something */
+	double near;                  /* of the set of occluders */
+	int occluded;                 /* set when an occluder hides something */
 	double evaluations;           /* so far */
 	/* The eye in work. */
 	double reach;                 /* of the farthest corner of what is looked at */
@@ -41,17 +42,17 @@ struct visible_point {
 	struct outline_planes planes[SHAFT_OCCLUDERS];
 };
 
-/* To be called when blockers have changed. */
-void occ_visible_begin(struct visible_point *s, int blockers, double near);
+/* To be called when occluders have changed. */
+void occ_visible_begin(struct visible_point *s, int occluders, double near);
 
 /* The form factor from a point x with a unit normal to what it sees of facet g, which is
- * in front of it; exact. blockers: a bit for each that may hide something. NaN and e when
+ * in front of it; exact. occluders: a bit for each that may hide something. NaN and e when
  * polygons have too many corners. */
 double occ_visible_exchange(struct visible_point *s, const double x[3], const double normal[3], const struct facet *g,
-                            uint64_t blockers, struct err *e);
+                            uint64_t occluders, struct err *e);
 
 /* The same for any measure: its sum over convex polygons that are together what is seen. */
-double occ_visible_integrate(struct visible_point *s, const double x[3], const struct facet *g, uint64_t blockers,
+double occ_visible_integrate(struct visible_point *s, const double x[3], const struct facet *g, uint64_t occluders,
                              visible_measure measure, void *arg, struct err *e);
 
 #endif

@@ -189,9 +189,10 @@ const struct emitter *pathtrace_emitter(const struct pathtrace *p, const double 
 
 int pathtrace_roulette(double *throughput, int bands, struct rng *r)
 {
-	/* Below 1, so that paths end even between surfaces that absorb nothing; not
-	 * by much, because weights must not grow where little is absorbed. */
-	const double most = .9999;
+	/* Below 1, so that paths end even between surfaces that absorb nothing (after ten thousand
+	 * events, on average); not by much, because weights must not grow where little is absorbed.
+	 * A guess. */
+	static const double most = .9999;
 	double go_on = 0;
 
 	for (int b = 0; b < bands; b++)

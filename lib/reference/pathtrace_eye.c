@@ -8,12 +8,18 @@
 #include "lib/reference/pathtrace_internal.h"
 #include "lib/scatter/bsdf.h"
 
+/* Counts. They change noise and time, never the expectation; guesses. */
 enum {
-	FREE_BOUNCES = 4,   /* before Russian roulette begins */
-	PASSES_MAX = 4096,  /* surfaces in a row that a straight ray may pass */
+	FREE_BOUNCES = 4,   /* before Russian roulette begins: what is most of a picture's light */
+	PASSES_MAX = 4096,  /* surfaces in a row that a straight ray may pass: more than any scene has,
+	                       so that rounding cannot hold a path for ever */
 	LIGHTS_ALL = 16,    /* lights and images that are all looked at */
-	BATCHES = 8         /* of a pixel's samples, for its standard error */
+	BATCHES = 8         /* of a pixel's samples, for its standard error, known then to 27 %: each
+	                       is stratified by itself, so fewer would be less noisy and less known */
 };
+
+/* Work for a thread at a time, pixels. */
+enum { PIXELS_AT_ONCE = 16 };
 
 struct eye_path {
 	double org[3], dir[3];
@@ -103,8 +109,8 @@ static void add_direct(const struct pathtrace *p, const struct eye_path *path,
 
 /* How a vertex sees a light or image; returns its irradiance, mean of the bands, if nothing is
  * between. */
-static double sight(const struct pathtrace *p, const struct vertex *v, size_t light,
-                    struct light_sight *s)
+static double light_irradiance(const struct pathtrace *p, const struct vertex *v, size_t light,
+                               struct light_sight *s)
 {
 	const struct lights *l = &p->ways.images.l;
 	const double *intensity = &l->intensity[light * (size_t)p->m->bands];
@@ -127,7 +133,7 @@ static void add_light(const struct pathtrace *p, const struct eye_path *path,
 	struct light_sight s;
 	uint64_t rays = 0;
 
-	sight(p, v, light, &s);
+	light_irradiance(p, v, light, &s);
 	bsdf_eval(m, v->material, v->n, s.toward, wo, f);
 	double scale = times * s.across * s.falloff * fabs(v3_dot(v->n, s.toward));
 	for (int b = 0; b < m->bands; b++) {
@@ -156,11 +162,11 @@ static void add_lights(const struct pathtrace *p, const struct eye_path *path,
 		if (all)
 			add_light(p, path, v, i, 1, radiance);
 		else
-			sum += sight(p, v, i, &s);
+			sum += light_irradiance(p, v, i, &s);
 	}
 	left = u * sum;
 	for (size_t i = 0; sum > 0 && i < n; i++, left -= here) {
-		here = sight(p, v, i, &s);
+		here = light_irradiance(p, v, i, &s);
 		if (here > 0 && left < here) {
 			add_light(p, path, v, i, sum / here, radiance);
 			return;
@@ -342,7 +348,7 @@ int pathtrace_picture(const struct pathtrace *p, const struct view_frame *f,
 
 	if (new_picture(&j, e))
 		return -1;
-	par_for((size_t)f->width * (size_t)f->height, 16, o->threads, render_pixels, &j, progress);
+	par_for((size_t)f->width * (size_t)f->height, PIXELS_AT_ONCE, o->threads, render_pixels, &j, progress);
 	if (relative_error)
 		*relative_error = o->samples < 2 ? (double)INFINITY
 		                                 : relative_rms(picture, 3 + band_channels(p->m));

@@ -1,5 +1,5 @@
 /* What eye paths and particles share: emitters to choose from, points on the
- * surfaces, Russian roulette. Internal to lib/pathtrace*.c. */
+ * surfaces, Russian roulette. Private to lib/reference. */
 #ifndef TWOPASS_PATHTRACE_INTERNAL_H
 #define TWOPASS_PATHTRACE_INTERNAL_H
 

@@ -10,8 +10,8 @@
 #include "lib/scatter/bsdf.h"
 #include "lib/scatter/lobe.h"
 
-/* Equal, independent parts of the particles, for the standard errors: enough to
- * know these to 9 %. Merged in order, so sums do not depend on the threads. */
+/* Equal, independent parts of the particles, a count, for the standard errors: enough to know
+ * these to 1 / sqrt(2 (64 - 1)), 9 %. Merged in order, so sums do not depend on the threads. */
 enum { BATCHES = 64 };
 
 /* Flux per batch: [2 elements][bands] that arrived, then [bands] that escaped. */

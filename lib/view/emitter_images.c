@@ -11,6 +11,14 @@
 #include "lib/scatter/lobe.h"
 #include "lib/view/lobe_weight.h"
 
+/* Tolerances that float32 positions need, relative to the size of the emitter (its radius): of what is
+ * not behind a mirror, and of an element in the plane of an emitter; and the cosine of 1.4e-3
+ * radians, up to which two planes face the same way. Guesses. */
+static const double behind = 1e-6, in_plane = 1e-5, same_way = 1 - 1e-6;
+
+/* Cosines are no less: a density at grazing angles is large but finite. */
+static const double cosine_least = 1e-9;
+
 /* ---- images ---- */
 
 /* What a mirror makes of a facet; none if that is behind it. */
@@ -20,7 +28,7 @@ static void turn(const struct facet *f, const struct mirror_plane *k, const doub
 	double offset = k->offset - v3_dot(k->n, centre), lowest, highest;
 
 	geo_facet_heights(f, k->n, offset, &lowest, &highest);
-	if (highest <= 1e-6 * f->radius)
+	if (highest <= behind * f->radius)
 		return;
 	for (int i = 0; i < f->n; i++) { /* the other way round, so that its front sends */
 		const double *x = &f->v[3 * (f->n - 1 - i)];
@@ -75,8 +83,8 @@ static uint32_t emitter_of(const struct emitter_images *s, const struct model *m
 		v3_mad(x, 1. / 3, &m->vertex[3 * (size_t)m->element.corner[3 * element + k]], x);
 	for (size_t i = 0; i < s->emitters.n; i++) {
 		const struct facet *f = &s->emitters.emitter[i].f;
-		if ((side == FRONT ? 1 : -1) * v3_dot(n, f->normal) > 1 - 1e-6 &&
-		    fabs(v3_dot(x, f->normal) - f->offset) < 1e-5 * f->radius && inside(f, x))
+		if ((side == FRONT ? 1 : -1) * v3_dot(n, f->normal) > same_way &&
+		    fabs(v3_dot(x, f->normal) - f->offset) < in_plane * f->radius && inside(f, x))
 			return (uint32_t)i;
 	}
 	return UINT32_MAX;
@@ -172,7 +180,7 @@ void view_emitter_images_choose(const struct emitter_images *s, const struct vie
 double view_emitter_images_density(const struct emitter_images *s, const struct view_aim *a, size_t image,
                                    double way, double cosine)
 {
-	return a->guess[image] / a->sum * way * way / (fmax(cosine, 1e-9) * s->image[image].area);
+	return a->guess[image] / a->sum * way * way / (fmax(cosine, cosine_least) * s->image[image].area);
 }
 
 double view_emitter_images_aim(const struct emitter_images *s, const struct view_aim *a, const double u[3],

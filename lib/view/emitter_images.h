@@ -13,6 +13,8 @@
 
 struct view_lobe_seen;
 
+/* Counts: what has more is sampled by its lobes alone. All images are looked at for each lobe seen
+ * (816 at most). As many emitters as direct light takes by formula; mirrors: a guess. */
 enum {
 	VIEW_EMITTERS_MOST = 48, VIEW_MIRRORS_MOST = 16,
 	VIEW_IMAGES_MOST = VIEW_EMITTERS_MOST * (VIEW_MIRRORS_MOST + 1)

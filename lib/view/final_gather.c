@@ -12,18 +12,22 @@
 #include "lib/interpolate/smooth_groups.h"
 #include "lib/view/final_gather_rays.h"
 
-/* cos 30 degrees, as for interpolation. */
 /* Root mean square over an element of what linear interpolation misses, by the second
- * difference across an edge: h^2 f'' against h^2 f'' / sqrt(120). */
+ * difference across an edge: h^2 f'' / sqrt(120) by h^2 f'', .091, where f'' is the same all
+ * around; a little more, since it seldom is. */
 static const double per_difference = .1;
 
-/* What interpolation may miss, relative to all irradiance, where no error is asked for. */
+/* What interpolation may miss, relative to all irradiance, where no error is asked for: about
+ * what a screen of 8 bits can show. A guess. */
 static const double usual_miss = .01;
 
-enum {
-	VALENCE = 64,  /* corners of a group that are looked at together */
-	FEWEST = 64    /* rays of a point */
-};
+/* Counts. A group has six corners as a rule; one of more than VALENCE is taken in pieces, which
+ * share no gathering. FEWEST: rays of a point that gathers for itself, below which its four
+ * parts tell no error. Guesses. */
+enum { VALENCE = 64, FEWEST = 64 };
+
+/* Work for a thread at a time, counts: gathering groups takes long, comparing sides does not. */
+enum { GROUPS_AT_ONCE = 16, SIDES_AT_ONCE = 1024 };
 
 struct gather {
 	const struct view_scene *v;
@@ -135,7 +139,15 @@ struct corner_point {
 	double shift[BANDS_MAX];/* what indirect light has more at the vertex, by interpolation */
 };
 
-static const double towards_middle = .5;
+/* How far that is, as parts of the way from the vertex to the middle. Half of it,
+ * where elements bend no further than it takes to leave the vertex. Where two are compared
+ * across an edge, close to the vertex, so that little but what stands on the edge is in
+ * between, and so many ray offsets above. Guesses. */
+static const double towards_middle = .5, towards_middle_bent = 1e-3, beside_edge = .02;
+static const double above = 8;
+
+/* Elements bend where the cosine between their normals is less: 1.4e-3 radians. */
+static const double same_plane = 1 - 1e-6;
 
 static void centroid(const struct model *m, uint32_t element, double x[3])
 {
@@ -151,8 +163,9 @@ static double inwards(const struct model *m, const uint32_t *corner, const uint3
 	const double *first = &m->element.normal[3 * (size_t)(corner[cluster] / 3)];
 
 	for (uint32_t i = 0; i < n; i++)
-		if (of[i] == cluster && v3_dot(first, &m->element.normal[3 * (size_t)(corner[i] / 3)]) < 1 - 1e-6)
-			return 1e-3;
+		if (of[i] == cluster &&
+		    v3_dot(first, &m->element.normal[3 * (size_t)(corner[i] / 3)]) < same_plane)
+			return towards_middle_bent;
 	return towards_middle;
 }
 
@@ -218,8 +231,8 @@ static void near_corner(const struct gather *g, uint32_t corner, int side, doubl
 
 	centroid(m, corner / 3, c);
 	for (int k = 0; k < 3; k++)
-		c[k] = vertex[k] + .02 * (c[k] - vertex[k]);
-	v3_mad(c, (side ? -8 : 8) * ray_offset(g->v->rays), n, x);
+		c[k] = vertex[k] + beside_edge * (c[k] - vertex[k]);
+	v3_mad(c, (side ? -above : above) * ray_offset(g->v->rays), n, x);
 }
 
 /* Do the elements of two corners at one vertex share an edge there? */
@@ -350,8 +363,8 @@ static void find_misses(void *arg, size_t begin, size_t end, int thread)
 
 void view_gather_corners(struct gather *g, const struct progress *progress)
 {
-	par_for(2 * g->groups.groups, 16, g->o.threads, gather_groups, g, progress);
-	par_for(2 * g->v->m->element.n, 1024, g->o.threads, find_misses, g, NULL);
+	par_for(2 * g->groups.groups, GROUPS_AT_ONCE, g->o.threads, gather_groups, g, progress);
+	par_for(2 * g->v->m->element.n, SIDES_AT_ONCE, g->o.threads, find_misses, g, NULL);
 }
 
 /* ---- points ---- */

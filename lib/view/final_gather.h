@@ -1,5 +1,11 @@
 /* Final gathering: indirect irradiance at points, from rays over their hemisphere against
- * the solution.
+ * the solution. At a point x with normal n it estimates
+ *
+ *     H_indirect(x) = integral over the hemisphere of L(y, -w) (n.w) dw
+ *                   = pi mean of L(y_i, -w_i),   w_i by the density (n.w) / pi,
+ *
+ * y being what the ray from x along w meets, and L its diffuse radiance M(y) / pi, behind
+ * directional events times their weight: the same L as view.h's, without L_e.
  *
  * What a ray meets adds the radiance of its diffuse light, interpolated; where it meets a
  * surface that reflects or transmits directionally it goes on, but an emitter is never

@@ -6,25 +6,29 @@
 
 #include "lib/base/constants.h"
 #include "lib/base/mem.h"
+#include "lib/base/replicates.h"
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
 
+/* Counts of rays, powers of two, which Sobol points fill evenly. Guesses but for AT_ONCE. */
 enum {
-	PARTS = 4,              /* of the sequence, that a standard error comes from */
-	FIRST = 64, MOST = 1 << 14, /* rays of a part where an error is aimed at */
-	AT_ONCE = 512,          /* rays that are sorted by direction: eight for each of */
-	ERRORS = 8,             /* of so many rays the error of the solution is asked for */
-	CELLS = 8               /* so many squared cells, exactly, when they are aligned */
+	FIRST = 64, MOST = 1 << 14, /* of a part where an error is aimed at: the least that tells one,
+	                               and what takes a point 20 ms at 3 million rays a second */
+	CELLS = 8,                  /* squared, that rays are sorted into by direction, and */
+	AT_ONCE = 512,              /* sorted at a time: eight for each cell, exactly, when they are
+	                               aligned, as many as a packet of rays has */
+	ERRORS = 8                  /* of so many one is asked for the error of the solution: an
+	                               eighth of its cost, and it need not be known well */
 };
 
-/* Standard error of a stretch of the sequence over that of as many independent parts: the
- * parts fill one another's gaps. Measured. */
+/* Standard error of a stretch of the sequence over that of as many independent parts, no unit:
+ * the parts fill one another's gaps. Measured when gathering was written, by which command is
+ * not known; test_view_gather.c holds stated errors to a factor of 2. */
 static const double together = .6;
 
-/* The direct light of a rough side is computed, to such an error where it is sampled, up to so
- * many times its size away. */
-#define ROUGHLY .1
-#define CLOSE 4
+/* The direct light of a rough side is computed, to such a relative error where it is sampled, up
+ * to so many times its size away: beyond, gathering blurs what elements do not show. Guesses. */
+static const double roughly = .1, near_sizes = 4;
 
 int view_gather_worker_init(struct gather_worker *w, const struct gather_table *t,
                             const struct view_scene *v, int depth, struct err *e)
@@ -48,7 +52,7 @@ void view_gather_worker_free(struct gather_worker *w)
 static void turns(const float *u, float *cosine, float *sine)
 {
 	for (int i = 0; i < RAY_BATCH; i++) {
-		float a = (u[i] - .5f) * 3.14159265f, q = a * a;
+		float a = (u[i] - .5f) * (float)PI, q = a * a;
 		float s = a * (1 + q * (-1.f / 6 + q * (1.f / 120 + q * (-1.f / 5040 + q * (1.f / 362880 -
 		          q * (1.f / 39916800))))));
 		float c = 1 + q * (-.5f + q * (1.f / 24 + q * (-1.f / 720 + q * (1.f / 40320 +
@@ -147,7 +151,7 @@ static void add_close(struct gather_worker *w, const struct gather_close *p)
 			continue;
 		occ_direct_begin(w->direct, (uint32_t)(p->place / 2 * 2) + (uint32_t)side);
 		interp_reconstruction_at(&v->all, p->place / 2, side, middle, usual);
-		if (occ_direct_at(w->direct, p->x, p->place, ROUGHLY, usual, h, error, &w->e))
+		if (occ_direct_at(w->direct, p->x, p->place, roughly, usual, h, error, &w->e))
 			return;
 		for (size_t b = 0; b < bands; b++)
 			p->sum[b] += part[b] * h[b];
@@ -199,7 +203,7 @@ static void go_on(struct gather_worker *w, const double x[3], const struct ray_b
 	if (close || i % ERRORS == 0) {
 		hit_point(t->v->m, b->triangle[i], (double)b->w[0][i], (double)b->w[1][i], y);
 		v3_sub(y, x, d);
-		close = close && v3_dot(d, d) < CLOSE * CLOSE * t->v->m->element.area[place / 2];
+		close = close && v3_dot(d, d) < near_sizes * near_sizes * t->v->m->element.area[place / 2];
 	}
 	if (i % ERRORS == 0)
 		add_blur(w, d, place, close);
@@ -263,19 +267,15 @@ static void add_rays(struct gather_worker *w, const double x[3], double frame[3]
 
 /* Irradiance from the sums of parts of `rays` rays each, and its standard error. 1 if that
  * is small enough. */
-static int settled(double part[PARTS][BANDS_MAX], int bands, double rays, double relative,
+static int settled(double part[REPLICATES][BANDS_MAX], int bands, double rays, double relative,
                    const double *scale, double *h, double *error)
 {
 	int good = 1;
 
 	for (int b = 0; b < bands; b++) {
-		double mean = 0, square = 0;
-		for (int p = 0; p < PARTS; p++)
-			mean += part[p][b] / PARTS;
-		for (int p = 0; p < PARTS; p++)
-			square += (part[p][b] - mean) * (part[p][b] - mean);
-		h[b] = PI * mean / rays;
-		error[b] = PI * together * sqrt(square / (PARTS * (PARTS - 1))) / rays;
+		struct replicates r = replicates_of(&part[0][b], BANDS_MAX, REPLICATES);
+		h[b] = PI * r.mean / rays;
+		error[b] = PI * together * replicates_error(r, REPLICATES) / rays;
 		good &= error[b] <= relative * scale[b];
 	}
 	return good;
@@ -284,27 +284,25 @@ static int settled(double part[PARTS][BANDS_MAX], int bands, double rays, double
 void view_gather_point(struct gather_worker *w, const double x[3], const double n[3], uint64_t seed,
                        int rays, double relative, const double *scale, struct gathered *to)
 {
-	double part[PARTS][BANDS_MAX] = { { 0 } }, frame[3][3];
+	double part[REPLICATES][BANDS_MAX] = { { 0 } }, frame[3][3];
 	int bands = w->t->v->m->bands;
-	uint32_t each = relative > 0 ? FIRST : (uint32_t)(rays + PARTS - 1) / PARTS;
+	uint32_t each = relative > 0 ? FIRST : (uint32_t)(rays + REPLICATES - 1) / REPLICATES;
 
 	memset(w->blur, 0, sizeof w->blur);
 	w->blurs = 0;
 	memcpy(w->normal, n, sizeof w->normal);
 	v3_frame(n, frame[0], frame[1]);
 	memcpy(frame[2], n, sizeof frame[2]);
-	for (uint32_t p = 0; p < PARTS; p++)
+	for (uint32_t p = 0; p < REPLICATES; p++)
 		add_rays(w, x, frame, seed, p * each, each, part[p]);
 	add_closes(w);
-	while (!settled(part, bands, each, relative, scale, to->h, to->error) && relative > 0 && each < MOST) {
+	while (!settled(part, bands, each, relative, scale, to->h, to->error) && relative > 0 &&
+	       each < MOST) {
 		/* As many again: the parts so far are half as many, twice as long. */
 		each *= 2;
-		for (int b = 0; b < bands; b++) {
-			part[0][b] += part[1][b];
-			part[1][b] = part[2][b] + part[3][b];
-			part[2][b] = part[3][b] = 0;
-		}
-		for (uint32_t p = 2; p < PARTS; p++)
+		for (int b = 0; b < bands; b++)
+			replicates_halve(&part[0][b], BANDS_MAX);
+		for (uint32_t p = REPLICATES / 2; p < REPLICATES; p++)
 			add_rays(w, x, frame, seed, p * each, each, part[p]);
 		add_closes(w);
 	}

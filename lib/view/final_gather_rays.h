@@ -14,6 +14,7 @@ struct gather_close {
 	double *sum;                /* that its radiance goes into */
 };
 
+/* A count: points that wait, to be looked at side by side (128 KB a thread). A guess. */
 enum { GATHER_CLOSES = 2048 };
 
 /* One thread's. */
@@ -23,7 +24,7 @@ struct gather_worker {
 	struct gather_close close[GATHER_CLOSES];
 	uint32_t closes;
 	double normal[3];           /* of the point in work */
-	double blur[BANDS_MAX];     /* variance of the radiance that the solution has found wrong, */
+	double blur[BANDS_MAX];     /* variance of radiance by the errors that the solution states, */
 	double blurs;               /* summed over so many rays */
 	struct direct_worker *direct;
 	struct err e;

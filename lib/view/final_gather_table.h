@@ -5,7 +5,9 @@
 #include "lib/ray/locate.h"
 #include "lib/view/view_scene.h"
 
-enum { GATHER_BITS = 1 << 12 }; /* points of the sequence that are kept */
+/* Points of the sequence that are kept, a count: enough for --gather-rays 4096, and in the cache
+ * (32 KB). */
+enum { GATHER_BITS = 1 << 12 };
 
 /* What rays find: the radiance of element-sides as a linear function of the weights of
  * corners 1 and 2 of their triangles, c0 + c1 w1 + c2 w2. */

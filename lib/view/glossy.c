@@ -3,22 +3,26 @@
 #include <math.h>
 #include <string.h>
 
+#include "lib/base/replicates.h"
 #include "lib/base/rng.h"
 #include "lib/base/vec3.h"
 #include "lib/scatter/lobe.h"
 #include "lib/view/shade_tile.h"
 
+/* Counts of samples, powers of two, which Sobol points fill evenly. Guesses; README.md has what
+ * lobes cost in pictures (tests/bench/report). */
 enum {
-	PARTS = 4,             /* of the samples, that a standard error comes from */
-	FIRST = 4, MOST = 64,  /* samples of a part where an error is aimed at */
+	FIRST = 4, MOST = 64,  /* of a part where an error is aimed at */
 	PROBES = 8             /* of each of two parts that tell how far one ray is off */
 };
 
-/* Standard error of a stretch of the sequence over that of as many independent parts: the
- * parts fill one another's gaps. Measured. */
+/* Standard error of a stretch of the sequence over that of as many independent parts, no unit:
+ * the parts fill one another's gaps. Measured when lobes were first sampled so, by which
+ * command is not known; test_view_lobes.c holds stated errors to a factor of 2. */
 static const double together = .8;
 
-/* Images of emitters are aimed at if they may bring such a part of the pixel's light. */
+/* Images of emitters are aimed at if they may bring such a part of the pixel's light: a guess,
+ * less than the noise of samples that stop at an error of 5 %. */
 static const double worth_aiming = .01;
 
 /* Sums over the samples of a part. */
@@ -34,7 +38,7 @@ struct run {
 	const double *coefficient;
 	struct view_branch *next;
 	uint32_t first;          /* index of the first sample */
-	struct part part[PARTS];
+	struct part part[REPLICATES];
 };
 
 /* Follows the next branch to its end. */
@@ -122,15 +126,13 @@ static void aim(struct view_walker *w, const struct view_branch *b, const struct
 static void measure(const struct run *r, int parts, double n, int lit, double *mean, double *variance)
 {
 	for (int b = 0; b < r->w->v->m->bands; b++) {
-		double sum = 0, square = 0;
+		double sum[REPLICATES];
 		for (int p = 0; p < parts; p++)
-			sum += r->part[p].rest[b] + (lit ? r->part[p].lit[b] : 0);
-		for (int p = 0; p < parts; p++) {
-			double off = r->part[p].rest[b] + (lit ? r->part[p].lit[b] : 0) - sum / parts;
-			square += off * off;
-		}
-		mean[b] = sum / n;
-		variance[b] = parts > 1 ? together * together * square * parts / ((parts - 1) * n * n) : 0;
+			sum[p] = r->part[p].rest[b] + (lit ? r->part[p].lit[b] : 0);
+		struct replicates all = replicates_of(sum, 1, parts);
+		mean[b] = all.mean * parts / n;
+		variance[b] = parts > 1 ? together * together * all.squares * parts /
+		                          ((parts - 1) * n * n) : 0;
 	}
 }
 
@@ -138,7 +140,7 @@ static int settled(const struct run *r, double n)
 {
 	double mean[BANDS_MAX], variance[BANDS_MAX], aim = r->w->shader->lobe_relative;
 
-	measure(r, PARTS, n, !occ_direct_exact(r->w->v->direct), mean, variance);
+	measure(r, REPLICATES, n, !occ_direct_exact(r->w->v->direct), mean, variance);
 	for (int b = 0; b < r->w->v->m->bands; b++) {
 		double all = aim * (mean[b] + r->l->other[b]);
 		if (variance[b] > all * all)
@@ -152,24 +154,21 @@ static uint32_t follow_until(struct run *r)
 {
 	uint32_t each = FIRST;
 
-	for (uint32_t i = 0; i < PARTS * each; i++)
+	size_t stride = sizeof *r->part / sizeof(double);
+
+	for (uint32_t i = 0; i < REPLICATES * each; i++)
 		follow_both(r, i, &r->part[i / each]);
-	while (!settled(r, PARTS * each) && each < MOST) {
+	while (!settled(r, REPLICATES * each) && each < MOST) {
 		/* As many again: the parts so far are half as many, twice as long. */
 		each *= 2;
-		for (int b = 0; b < r->w->v->m->bands; b++)
-			for (int k = 0; k < 2; k++) {
-				double *at[PARTS];
-				for (int p = 0; p < PARTS; p++)
-					at[p] = k ? &r->part[p].lit[b] : &r->part[p].rest[b];
-				*at[0] += *at[1];
-				*at[1] = *at[2] + *at[3];
-				*at[2] = *at[3] = 0;
-			}
-		for (uint32_t i = 2 * each; i < PARTS * each; i++)
+		for (int b = 0; b < r->w->v->m->bands; b++) {
+			replicates_halve(&r->part[0].rest[b], stride);
+			replicates_halve(&r->part[0].lit[b], stride);
+		}
+		for (uint32_t i = REPLICATES / 2 * each; i < REPLICATES * each; i++)
 			follow_both(r, i, &r->part[i / each]);
 	}
-	return PARTS * each;
+	return REPLICATES * each;
 }
 
 /* How many, fewer where what is before the lobe has dimmed it. */
@@ -201,15 +200,15 @@ static void put_light(struct run *r, int parts, double n, const double *lit)
 static uint32_t follow_all(struct run *r, int *parts)
 {
 	const struct view_branch *b = r->b;
-	uint32_t n = r->w->o->lobe_samples == VIEW_LOBE_ENOUGH ? PARTS * MOST : fixed_number(r);
+	uint32_t n = r->w->o->lobe_samples == VIEW_LOBE_ENOUGH ? REPLICATES * MOST : fixed_number(r);
 
 	r->next->share = b->share / n;
-	*parts = PARTS;
+	*parts = REPLICATES;
 	if (r->w->o->lobe_samples == VIEW_LOBE_ENOUGH) {
 		r->first = b->index * n;
 		return follow_until(r);
 	}
-	*parts = n < PARTS ? (int)n : PARTS;
+	*parts = n < REPLICATES ? (int)n : REPLICATES;
 	r->first = b->index * (uint32_t)r->w->o->lobe_samples;
 	for (uint32_t i = 0; i < n; i++)
 		follow_both(r, i, &r->part[i * (uint32_t)*parts / n]);

@@ -37,9 +37,12 @@ double view_lobe_weight_at(const double dir[3], const void *arg)
 
 struct direct_weight view_lobe_weight(const struct view_lobe_weight *w)
 {
-	/* cos^k falls to exp(-1/2) over its width and to 1e-8 at its reach. */
-	struct direct_weight d = { .at = view_lobe_weight_at, .arg = w, .width = 1 / sqrt(w->l->k + 1),
-	                           .reach = acos(exp(-18.4 / fmax(w->l->k, 1e-9))) };
+	/* cos^k falls to exp(-1/2) over its width, and at its reach to what no picture shows,
+	 * exp(-18.4) = 1e-8. k = 0 reaches everywhere. */
+	static const double logarithm_at_reach = -18.4, k_least = 1e-9;
+	struct direct_weight d = { .at = view_lobe_weight_at, .arg = w,
+	                           .width = 1 / sqrt(w->l->k + 1),
+	                           .reach = acos(exp(logarithm_at_reach / fmax(w->l->k, k_least))) };
 
 	memcpy(d.axis, w->l->axis, sizeof d.axis);
 	return d;

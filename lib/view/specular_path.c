@@ -11,12 +11,17 @@
 #include "lib/view/highlights.h"
 #include "lib/view/shade_tile.h"
 
-/* Up to how many directional events from the eye light is computed rather than
- * interpolated; behind a lobe that is sampled it is always interpolated. */
-enum { VIEW_COMPUTED_DEPTH = 4 };
+/* Up to how many directional events from the eye light is computed rather than interpolated, a
+ * count: beyond, little of it reaches the pixel; a guess that trace(1) names. Behind a lobe
+ * that is sampled it is always interpolated. */
+enum { COMPUTED_DEPTH = 4 };
 
-/* Backs of one-sided materials in a row that a ray may pass. */
+/* Backs of one-sided materials in a row that a ray may pass, a count: more than any scene has, so
+ * that rounding between coincident faces cannot hold a ray for ever. */
 enum { PASSES_MAX = 4096 };
+
+/* Cosines are no less: at grazing angles the weight of a lobe is large but finite. */
+static const double cosine_least = 1e-14;
 
 /* A surface point as a ray meets it. */
 struct point {
@@ -152,7 +157,7 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b, str
 	double *diffuse = b->depth ? w->directional : w->diffuse;
 	double *emission = b->straight ? w->lit : b->depth ? w->directional : w->emission;
 	int computed = w->shader && w->v->method != VIEW_MESH && !b->lobes &&
-	               b->depth <= VIEW_COMPUTED_DEPTH;
+	               b->depth <= COMPUTED_DEPTH;
 	const struct reconstruction *r = computed ? &w->v->part : &w->v->all;
 
 	if (computed && (s->diffuse || s->translucent))
@@ -192,7 +197,7 @@ static void branch_into(struct view_walker *w, const struct view_branch *b, cons
                         const struct view_lobe *lobe, int side, struct view_branch *next)
 {
 	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
-	struct view_lobe_seen l = { .k = lobe->k, .cosine = fmax(p->cosine, 1e-14),
+	struct view_lobe_seen l = { .k = lobe->k, .cosine = fmax(p->cosine, cosine_least),
 	                            .element = p->element, .side = side, .table = &lobe->table };
 	double scale = w->v->m->lobe == LOBE_RECIPROCAL ? bsdf_lobe_albedo(lobe->k, p->cosine) : 1;
 

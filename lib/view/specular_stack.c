@@ -4,7 +4,8 @@
 
 size_t view_stack_size(const struct view_options *o)
 {
-	/* Every level leaves at most one branch waiting for each one it goes on with. */
+	/* Every level leaves at most one branch waiting for each one it goes on with:
+	 * depth + 1. Twice that leaves room to spare. */
 	return 2 * (size_t)o->depth + 4;
 }
 

@@ -11,23 +11,33 @@
 #include "lib/view/specular_path.h"
 #include "lib/view/view_layers.h"
 
+/* Counts; guesses. */
 enum {
-	TILE = 16,
-	ROUND = 4,  /* samples of a pixel that are followed before it is looked at again */
-	SUMS = 7,   /* arrays of view_sums */
-	PROBE = 4   /* of so many pixels squared one has its lobes probed */
+	TILE = 16,  /* pixels squared that are shaded together: their points share what is between
+	               surfaces and emitters, and their sums stay in the cache */
+	ROUND = 4,  /* samples of a pixel that are followed before it is looked at again: as many as
+	               pictures have by default */
+	PROBE = 4   /* of so many pixels squared one has its lobes probed: a sixteenth of the cost of
+	               sampling them, 16 probes a tile */
 };
 
-/* That shadow rays aim at, relative to the direct light of a pixel, where no error is asked
- * for. */
+enum { SUMS = 7 };  /* arrays of view_sums */
+
+/* That shadow rays aim at, relative to the direct light of a pixel, where no error is asked for:
+ * noise that one may see, at five to ten times the cost of none (trace(1), README.md). A guess. */
 static const double usual_error = .1;
 
-/* The same of samples of a lobe. */
+/* The same of samples of a lobe. A guess. */
 static const double usual_lobe_error = .05;
 
 /* Variance of the mean of n samples that are stratified over a pixel over that of samples
- * which are not, divided by sqrt(n). Measured at edges, with 2 to 16 samples. */
+ * which are not, divided by sqrt(n). Measured at edges, with 2 to 16 samples, by which command
+ * is not known; test_methods.c holds what is stated at edges to a factor of 3. */
 static const double stratified = .2;
+
+/* Where an error is asked for, the part of it that each sampled light of a pixel may have: some are
+ * left for the pixel's samples among one another. A guess that trace(1) names. */
+static const double part_of_error = .5;
 
 /* What a tile adds to the statistics, kept apart so that sums have one order. */
 struct tile_sum {
@@ -327,7 +337,7 @@ static int new_worker(const struct render *r, struct worker *k, int thread, stru
 		return -1;
 	if (!shades(r))
 		return 0;
-	double relative = r->o->relative / 2, usual = sqrt(r->o->samples);
+	double relative = r->o->relative * part_of_error, usual = sqrt(r->o->samples);
 	return view_shade_tile_init(&k->shader, r->v, r->gather,
 	                            relative > 0 ? relative : fmin(1, usual_error * usual),
 	                            relative > 0 ? relative : fmin(1, usual_lobe_error * usual), thread, e);
@@ -348,7 +358,7 @@ static int new_gather(struct render *r, struct err *e)
 {
 	int samples = r->o->samples < ROUND ? r->o->samples : ROUND;
 	struct gather_options o = { .rays = r->o->gather_rays, .samples = samples,
-		                    .relative = r->o->relative / 2,
+		                    .relative = r->o->relative * part_of_error,
 		                    .depth = r->o->depth, .threads = r->o->threads };
 
 	r->gather = r->v->method == VIEW_GATHER ? view_gather_new(r->v, &o, e) : NULL;

@@ -1,10 +1,21 @@
 /* The view-dependent pass: pictures of a solved scene.
  *
- * Radiance towards the eye = emission + M / pi + directional part. M comes from
- * the interpolated irradiance of both sides and holds every path up to its last
- * diffuse event; the directional part is found by following rays (the specular
- * tail), and emission is added once, at each surface that a tail meets. Cost:
- * O(pixels samples log triangles), times the tails' branches. */
+ * The radiance that point j sends to the eye is equation (1) of Nishitani and Nono, A Two-Pass
+ * Solution to the Global Illumination Model, as radiance:
+ *
+ *     L(j, eye) = L_e(j, eye)                                 emission            [KE term]
+ *               + M(j) / pi                                   diffuse light       [(2), KD term]
+ *               + integral of f_s(wi, eye) L(j, wi) cos dwi   directional part    [KS term]
+ *
+ *     M(j) = rho_d H(this side) + tau_d(other side) H(other side)
+ *
+ * f_s being the lobes of reflection and of transmission, ideal ones included (lib/scatter/bsdf.h).
+ * H, the irradiance of pass 1, holds every path up to its last diffuse event: it is interpolated
+ * between elements, or computed at the point (enum view_method). The integral is found by
+ * following rays, the specular tail (specular_path.h): in the mirror and the straight-through
+ * direction, or by samples of the lobes. Nothing is counted twice: a tail adds M / pi and L_e
+ * of each surface it meets, and goes on by the directional part alone.
+ * Cost: O(pixels samples log triangles), times the tails' branches. */
 #ifndef TWOPASS_VIEW_H
 #define TWOPASS_VIEW_H
 
@@ -13,7 +24,6 @@
 #include "lib/base/err.h"
 #include "lib/base/parallel.h"
 #include "lib/data/model.h"
-#include "lib/data/solution.h"
 #include "lib/picture/camera.h"
 #include "lib/picture/image.h"
 #include "lib/ray/ray.h"
@@ -37,7 +47,7 @@ enum view_method { VIEW_MESH, VIEW_DIRECT, VIEW_GATHER };
 enum { VIEW_LOBE_ENOUGH = -1 };
 
 struct view_options {
-	int samples;       /* a pixel; 1 = its centre, else stratified over it */
+	int samples;       /* of a pixel; 1 = its centre, else stratified over it */
 	double relative;   /* sampling of a pixel stops where its standard error is this times
 	                      its radiance, after `samples` at the latest; 0: never */
 	int lobe_samples;  /* of a finite lobe; 0 = one ray in the mirror or straight-through
@@ -49,6 +59,8 @@ struct view_options {
 	int threads;
 };
 
+/* Guesses, but README.md has what samples and gathering rays cost and bring (tests/bench/report).
+ * Depth 32: what mirrors of .8 leave is then below the cutoff. */
 #define VIEW_OPTIONS_DEFAULT \
 	((struct view_options){ .samples = 4, .lobe_samples = VIEW_LOBE_ENOUGH, .depth = 32, \
 	                        .cutoff = 1e-3, .gather_rays = 1024 })
@@ -63,6 +75,7 @@ struct view_stats {
 	                      nor nothing */
 };
 
+struct solution;
 struct view_scene;
 
 /* What all views share: tables of materials, interpolated irradiance, the brightest

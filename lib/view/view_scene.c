@@ -5,6 +5,8 @@
 
 #include "lib/base/constants.h"
 #include "lib/base/mem.h"
+#include "lib/data/model_check.h"
+#include "lib/data/solution.h"
 #include "lib/interpolate/discretisation.h"
 
 static void make_lobe(struct view_lobe *lobe, const double *coefficient, int bands, double k)
@@ -54,7 +56,7 @@ static double corner_ceiling(const struct view_scene *v, size_t material, int si
 		kept -= s->reflected.coefficient[band];
 	if (s->transmitted.coefficient)
 		kept -= s->transmitted.coefficient[band];
-	if (kept < -1e-6)
+	if (kept < -MODEL_ALBEDO_SLACK)
 		return (double)INFINITY;
 	return own > 0 ? own / fmax(kept, 0) : 0;
 }
@@ -99,8 +101,13 @@ static int tabulate(struct view_scene *v, struct err *e)
 static const unsigned interpolated[] = { PART_ALL, PART_CAUSTIC | PART_INDIRECT, PART_CAUSTIC };
 
 /* Errors of interpolated irradiance over those that the solution states of elements, of
- * noise and of discretisation: fits to several elements take part of both out. Measured. */
+ * noise and of discretisation, no unit: fits to several elements take part of both out.
+ * Measured when pictures first stated errors, by which command is not known; the report's
+ * stated errors (tests/bench/report/stated.py) and test_view_gather.c tell when they are wrong. */
 static const double noise_left = .22, discretisation_left = .6;
+
+/* Variance of a linear fit at an edge over that in the middle. */
+static const double variance_at_edge = 4;
 
 /* What is left of an error without that of a part. */
 static double without(const double *all, const double *part, size_t at)
@@ -114,9 +121,8 @@ double view_blurred(const struct view_scene *v, size_t at, double part, int comp
 	double noise = without(s->error.sampling, computed ? s->error.sampling_direct : NULL, at);
 	double missed = without(s->error.discretisation, computed ? s->error.discretisation_direct : NULL, at);
 
-	/* What is so near stands at an edge, where a linear fit has four times the variance that
-	 * it has in the middle. */
-	return fmin(4 * noise_left * noise_left, part) * noise +
+	/* What is so near stands at an edge. */
+	return fmin(variance_at_edge * noise_left * noise_left, part) * noise +
 	       fmin(1, part) * discretisation_left * discretisation_left * missed;
 }
 

@@ -62,7 +62,7 @@ static void scene(uint64_t seed, int every, double tolerance)
 	double centre[3];
 	struct exchanger x, y;
 	struct exchange_options o = { .relative = 1e-9, .absolute = tolerance, .most = 20000,
-	                              .bodies = SHAFT_OCCLUDERS };
+	                              .occluders = SHAFT_OCCLUDERS };
 
 	if (random_scene(&m, seed) || occ_facet_set_init(&s, &m, FACETS_OF_PATCHES, &e) ||
 	    occ_occluder_set_init(&bodies, &m, &e)) {
@@ -118,7 +118,7 @@ static void scene(uint64_t seed, int every, double tolerance)
 		}
 	printf("seed %lu: %zu facets, %zu bodies, %.0f clear %.0f hidden %.0f partly, %.0f ev each, "
 	       "%d checked %d bad, worst 1e-6:1e-8 %.2g, %.2g of stated, %.1f s (%.1f fine %.1f brute %.1f)\n", (unsigned long)seed, s.facets,
-	       bodies.bodies, x.counts.clear, x.counts.hidden, x.counts.partly,
+	       bodies.occluders, x.counts.unoccluded, x.counts.hidden, x.counts.partly,
 	       x.counts.evaluations / fmax(1, x.counts.partly), checked, bad, worst_off, ratio,
 	       seconds() - begun, main_time, fine_time, brute_time);
 	fflush(stdout);
@@ -195,8 +195,8 @@ static void one(uint64_t seed, uint32_t i, uint32_t j)
 	front(f, g, bodies.near, &room[0], &a);
 	front(g, f, bodies.near, &room[1], &c);
 	printf("sight %d, bodies", (int)occ_shaft_cull(&l, &bodies, &a, &c));
-	for (int k = 0; k < l.bodies; k++) {
-		const struct occluder_body *o = &bodies.body[l.body[k]];
+	for (int k = 0; k < l.occluders; k++) {
+		const struct occluder_shape *o = &bodies.occluder[l.occluder[k]];
 		printf("\n  %s, %u corners:", o->flat ? "flat" : "solid", o->corners);
 		for (uint32_t q = 0; q < o->corners; q++)
 			printf(" (%.6f %.6f %.6f)", bodies.corner[3 * (o->corner + q)], bodies.corner[3 * (o->corner + q) + 1], bodies.corner[3 * (o->corner + q) + 2]);

@@ -22,7 +22,7 @@ static void ready(struct lab *l, double absolute)
 {
 	struct err e = { 0 };
 	struct exchange_options o = { .relative = 1e-9, .absolute = absolute, .most = 50000,
-	                              .bodies = SHAFT_OCCLUDERS };
+	                              .occluders = SHAFT_OCCLUDERS };
 
 	assert_int_equal(occ_facet_set_init(&l->s, &l->m, FACETS_OF_PATCHES, &e), 0);
 	assert_int_equal(occ_occluder_set_init(&l->bodies, &l->m, &e), 0);
@@ -42,8 +42,8 @@ static size_t flats(const struct occluder_set *s)
 {
 	size_t n = 0;
 
-	for (size_t i = 0; i < s->bodies; i++)
-		n += s->body[i].flat != 0;
+	for (size_t i = 0; i < s->occluders; i++)
+		n += s->occluder[i].flat != 0;
 	return n;
 }
 
@@ -65,12 +65,12 @@ static void check_block(int faces, int k, int one_sided, size_t bodies, size_t f
 	scene_block(&l.m, 0, 0, 0, 1, 2, 3, faces, k, 0);
 	assert_int_equal(scene_end(&l.m), 0);
 	ready(&l, 1e-6);
-	assert_int_equal(l.bodies.bodies, bodies);
+	assert_int_equal(l.bodies.occluders, bodies);
 	assert_int_equal(flats(&l.bodies), flat);
 	if (bodies && !flat) {
-		assert_int_equal(l.bodies.body[0].corners, 8);
-		assert_int_equal(l.bodies.body[0].edges, 12);
-		assert_int_equal(l.bodies.body[0].faces, 6);
+		assert_int_equal(l.bodies.occluder[0].corners, 8);
+		assert_int_equal(l.bodies.occluder[0].edges, 12);
+		assert_int_equal(l.bodies.occluder[0].faces, 6);
 	}
 	finish(&l);
 }
@@ -101,7 +101,7 @@ static void test_room(void **state)
 				scene_block(&l.m, 0, 0, 0, 1, 2, 3, faces, 3, inwards);
 				assert_int_equal(scene_end(&l.m), 0);
 				ready(&l, 1e-6);
-				assert_int_equal(l.bodies.bodies, 0);
+				assert_int_equal(l.bodies.occluders, 0);
 				finish(&l);
 			}
 }
@@ -127,9 +127,9 @@ static void test_not_convex(void **state)
 	scene_polygon(&l.m, 6, (const double (*)[3])v);
 	assert_int_equal(scene_end(&l.m), 0);
 	ready(&l, 1e-6);
-	for (size_t i = 0; i < l.bodies.bodies; i++) {
+	for (size_t i = 0; i < l.bodies.occluders; i++) {
 		given("i %zu", i);
-		const struct occluder_body *b = &l.bodies.body[i];
+		const struct occluder_shape *b = &l.bodies.occluder[i];
 		/* No body holds the notch. */
 		int holds = !b->flat;
 		for (uint32_t f = 0; holds && f < b->faces; f++) {
@@ -233,7 +233,7 @@ static void check_cone(int sides, size_t bodies, size_t flat)
 	           (double[]){ 2, -2, -1 });
 	assert_int_equal(scene_end(&l.m), 0);
 	ready(&l, 1e-3);
-	assert_int_equal(l.bodies.bodies, bodies);
+	assert_int_equal(l.bodies.occluders, bodies);
 	assert_int_equal(flats(&l.bodies), flat);
 	uint32_t last = (uint32_t)l.s.facets - 1;
 	for (uint32_t i = 0; i < last; i++)
@@ -280,8 +280,8 @@ static void test_sight(void **state)
 	(void)state;
 	for (int solid = 0; solid < 2; solid++) {
 		given("solid %d", solid);
-		assert_int_equal(look(solid, 1, 1), SHAFT_CLEAR);       /* touches the shaft */
-		assert_int_equal(look(solid, 2, 1), SHAFT_CLEAR);
+		assert_int_equal(look(solid, 1, 1), SHAFT_UNOCCLUDED);       /* touches the shaft */
+		assert_int_equal(look(solid, 2, 1), SHAFT_UNOCCLUDED);
 		assert_int_equal(look(solid, .9, 1), SHAFT_PARTLY);
 		assert_int_equal(look(solid, .4, .01), SHAFT_PARTLY);
 		assert_int_equal(look(solid, -.2, 1), SHAFT_PARTLY);
@@ -334,8 +334,8 @@ static void test_seen(void **state)
 				continue;
 			enum shaft_state sight = occ_shaft_cull(&s, &l.bodies, &f, &g);
 			int blockers = 0;
-			for (int i = 0; sight == SHAFT_PARTLY && i < s.bodies; i++)
-				blockers += occ_occluder_make(&l.bodies, s.body[i], &g, &seer.occluder[blockers]);
+			for (int i = 0; sight == SHAFT_PARTLY && i < s.occluders; i++)
+				blockers += occ_occluder_make(&l.bodies, s.occluder[i], &g, &seer.occluder[blockers]);
 			occ_visible_begin(&seer, blockers, near);
 			brute_begin(&brute, &l.m, l.centre, &f, &g, near);
 			for (int k = 0; k < 4; k++) {
