@@ -29,39 +29,36 @@ static const struct option_spec options[] = {
 	{ 'o', "output", "FILE", "write the form factors to FILE (.ff)", TEXT(output),
 	  .role = OPTION_ASIDE },
 	{ 'm', "method", "METHOD", "auto, rays, hemicube or analytic (default %s)",
-	  WORD(ff.method, methods), .preset = "auto" },
+	  WORD(ff.method, methods) },
 	{ 'n', "samples", "N",
 	  "rays a patch-side (default 4096), or pixels along a hemicube's edge (64)",
 	  INTEGER(ff.rays, 4, 1 << 26) },
-	{ 'p', "points", "N", "hemicubes a patch-side (default %s)", INTEGER(ff.points, 1, 4096),
-	  .preset = "16" },
+	{ 'p', "points", "N", "hemicubes a patch-side (default %s)", INTEGER(ff.points, 1, 4096) },
 	{ 't', "target", "X",
 	  "formulas: absolute error of a factor that is partly hidden (default 1e-4, to patches 1e-6)",
 	  NUMBER(ff.target, 1e-12, 1) },
 	{ 0, "to", "WHAT", "elements or patches: what receives (default %s)",
-	  WORD(ff.to_patches, receivers), .preset = "elements" },
+	  WORD(ff.to_patches, receivers) },
 	{ 0, "close", NULL,
 	  "formulas to patches: change what is in doubt so that closed rows add up",
 	  FLAG(ff.close) },
 	{ 0, "emitter-gain", "N", "times as many rays for emitters (default %s)",
-	  INTEGER(ff.emitter_gain, 1, 4096), .preset = "8" },
+	  INTEGER(ff.emitter_gain, 1, 4096) },
 	{ 0, "gather", "N", "rays an element-side gathers with (default a sixteenth of -n)",
 	  INTEGER(ff.gather, 0, 1 << 20) },
 	{ 0, "lobe-rays", "N", "rays a patch-side for each directional lobe (default %s)",
-	  INTEGER(ff.lobe_rays, 1, 1 << 26), .preset = "4096" },
+	  INTEGER(ff.lobe_rays, 1, 1 << 26) },
 	{ 0, "links", "HOW",
 	  "rays or centroid (the paper's): where light comes to a lobe from (default %s)",
-	  WORD(ff.centroid, sources), .preset = "rays" },
+	  WORD(ff.centroid, sources) },
 	{ 0, "lobe-depth", "N", "most lobes that light of a lobe is followed through (default %s)",
-	  INTEGER(ff.lobe_depth, 0, 64), .preset = "4" },
+	  INTEGER(ff.lobe_depth, 0, 64) },
 	{ 0, "depth", "N",
 	  "longest chain of mirrors, panes and lobes that is told apart (default %s)",
-	  INTEGER(ff.depth, 0, 1000000), .preset = "256" },
-	{ 0, "precision", "TYPE", "f32 or f64 (default %s)", WORD(ff.f64, precisions),
-	  .preset = "f32" },
+	  INTEGER(ff.depth, 0, 1000000) },
+	{ 0, "precision", "TYPE", "f32 or f64 (default %s)", WORD(ff.f64, precisions) },
 	{ 0, "part", "K/N", "compute the K-th of N shards only", RATIO(shard) },
-	{ 0, "seed", "N", "seed of the sample points (default %s)", INTEGER(ff.seed, 0, INT64_MAX),
-	  .preset = "1" },
+	{ 0, "seed", "N", "seed of the sample points (default %s)", INTEGER(ff.seed, 0, INT64_MAX) },
 	{ 0 }
 };
 
@@ -76,8 +73,6 @@ static void settle(struct cli *c, int operand, struct request *r)
 		cli_usage(c, "an output is needed: -o FILE.ff");
 	r->mesh = c->argv[operand];
 	cli_keep_input(c, r->output, r->mesh);
-	if (!options_given(c, "gather"))
-		o->gather = FF_GATHER_UNSET;
 	if (ff_options_complete(o, &contradiction))
 		cli_usage(c, "%s", contradiction.text);
 	o->shard = r->shard[0];
@@ -246,7 +241,7 @@ int main(int argc, char **argv)
 	struct cli c = { .program = "ffcalc", .synopsis = "[OPTION]... -o FILE.ff FILE.mesh",
 	                 .about = "Computes the form factors of a mesh.", .options = options,
 	                 .uses_threads = 1, .keeps_output = 1 };
-	struct request r = { .shard = { 1, 1 }, .ff.evaluations = 50000 };
+	struct request r = { .shard = { 1, 1 }, .ff = FF_OPTIONS_DEFAULT };
 	struct err e = { 0 };
 
 	settle(&c, options_parse(&c, argc, argv, &r), &r);

@@ -31,20 +31,20 @@ static const struct option_spec options[] = {
 	  TEXT(output), .role = OPTION_ASIDE },
 	{ 'p', "patch-size", "SIZE",
 	  "longest side of a patch: metres, 5% of the scene, inf (default %s)",
-	  LENGTH(mesher.patch), .preset = "5%" },
+	  LENGTH(mesher.patch) },
 	{ 'e', "element-size", "SIZE",
 	  "longest edge of an element (default %s, but within the patch size)",
-	  LENGTH(mesher.element), .preset = "4%" },
+	  LENGTH(mesher.element) },
 	{ 0, "normal-cone", "DEG", "how far normals in a curved patch may turn (default %s)",
-	  NUMBER(mesher.normal_cone, 0, 80), .preset = "20" },
+	  NUMBER(mesher.normal_cone, 0, 80) },
 	{ 0, "no-imprint", NULL, "do not cut surfaces where others cross or touch them",
 	  FLAG(mesher.no_imprint) },
 	{ 0, "min-directional", "X", "fold derived lobes below this share into diffuse (default %s)",
-	  NUMBER(gltf.min_directional, 0, 1), .preset = ".05" },
+	  NUMBER(gltf.min_directional, 0, 1) },
 	{ 0, "min-exponent", "K", "fold derived lobes of lower exponent into diffuse (default %s)",
-	  NUMBER(gltf.min_exponent, 0, INFINITY), .preset = "2" },
+	  NUMBER(gltf.min_exponent, 0, INFINITY) },
 	{ 0, "lobe", "KIND", "what exponents mean: %s (default) or reciprocal",
-	  WORD(gltf.lobe, lobes), .preset = "paper" },
+	  WORD(gltf.lobe, lobes) },
 	{ 0, "bands", "N", "number of bands (default: 1 for a grey scene, else 3)",
 	  INTEGER(gltf.bands, 1, BANDS_MAX) },
 	{ 0, "clamp", NULL, "rescale materials that return more than they receive",
@@ -52,11 +52,11 @@ static const struct option_spec options[] = {
 	{ 0, "refine", "FILE.rad", "divide the mesh of an earlier solution further where it is in error",
 	  TEXT(solution), .role = OPTION_RECORDED },
 	{ 0, "refine-error", "X", "until its relative error is X (default %s)",
-	  NUMBER(refine.error, 0, INFINITY), .preset = ".02" },
+	  NUMBER(refine.error, 0, INFINITY) },
 	{ 0, "refine-smallest", "SIZE", "but no element to a shorter longest edge (default %s)",
-	  LENGTH(refine.smallest), .preset = ".25%" },
+	  LENGTH(refine.smallest) },
 	{ 0, "refine-elements", "N", "and to about N elements at most (default %s)",
-	  INTEGER(refine.elements, 1, 1 << 28), .preset = "1000000" },
+	  INTEGER(refine.elements, 1, 1 << 28) },
 	{ 0 }
 };
 
@@ -441,7 +441,9 @@ int main(int argc, char **argv)
 		         .about = "Reads a glTF scene, cleans it, and divides its surfaces into "
 		                  "elements and patches.",
 		         .options = options, .uses_threads = 1, .keeps_output = 1 };
-	struct request r = { 0 };
+	struct request r = { .mesher = MESH_OPTIONS_DEFAULT, .gltf = GLTF_OPTIONS_DEFAULT,
+		             .refine = { .error = .02, .smallest = { .0025, 1 },
+		                         .elements = 1000000 } };
 	struct job j = { .cli = &c, .r = &r };
 	struct err e = { 0 };
 

@@ -52,9 +52,9 @@ static const struct option_spec option_table[] = {
 	{ 0, "centre", NULL, "sample each pixel at its centre, as trace --samples 1 does",
 	  FLAG(o.centre) },
 	{ 0, "seed", "N", "start of the random numbers (default: %s)",
-	  INTEGER(o.seed, 0, INT64_MAX), .preset = "1" },
+	  INTEGER(o.seed, 0, INT64_MAX) },
 	{ 0, "compression", "METHOD", "%s (default), zip, zips, piz, rle or none",
-	  WORD(exr.compression, file_exr_compression_name), .preset = "auto" },
+	  WORD(exr.compression, file_exr_compression_name) },
 	{ 0 }
 };
 
@@ -331,7 +331,8 @@ int main(int argc, char **argv)
 		         .synopsis = "[options] FILE.mesh -c CAMERA -o PICTURE.exr\n"
 		                     "       reference [options] FILE.mesh --irradiance [-o TABLE.csv]",
 		         .about = "Solve a scene by unbiased Monte Carlo, to compare with.",
-		         .options = option_table, .uses_threads = 1, .keeps_output = 1 }
+		         .options = option_table, .uses_threads = 1, .keeps_output = 1 },
+		.o.seed = 1
 	};
 	struct err e = { 0 };
 	int status = 0;

@@ -30,8 +30,8 @@ struct request {
 static const struct option_spec options[] = {
 	{ 'o', "output", "FILE", "write the solution to FILE (.rad)", TEXT(output),
 	  .role = OPTION_ASIDE },
-	{ 'e', "stop", "X", "stop when unshot / emitted flux is X everywhere (default %s)",
-	  NUMBER(solve.stop, 0, 1), .preset = "1e-4" },
+	{ 'e', "stop", "X", "stop when unshot / emitted flux is X everywhere (default 1e-4)",
+	  NUMBER(solve.stop, 0, 1) },
 	{ 'n', "shots", "N", "stop after N shots", INTEGER(solve.max_shots, 0, INT64_MAX) },
 	{ 0, "light-groups", NULL, "keep the light of each emitting material apart",
 	  FLAG(light_groups) },
@@ -420,7 +420,7 @@ int main(int argc, char **argv)
 	struct cli c = { .program = "shoot", .synopsis = "[OPTION]... -o FILE.rad FILE.mesh FILE.ff...",
 	                 .about = "Solves for the light in a scene by progressive shooting.",
 	                 .options = options, .uses_threads = 1, .keeps_output = 1 };
-	struct request r = { .solve.max_shots = UINT64_MAX };
+	struct request r = { .solve = RADIOSITY_OPTIONS_DEFAULT };
 	struct job j = { .cli = &c, .r = &r };
 	struct err e = { 0 };
 	int status;

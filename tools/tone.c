@@ -26,18 +26,17 @@ static const struct option_spec option_table[] = {
 	{ 'o', "output", "FILE", "write the PNG to FILE, - for standard output", TEXT(output),
 	  .role = OPTION_ASIDE },
 	{ 'e', "exposure", "EV", "multiply by 2^EV (default: %s)",
-	  NUMBER(curve.exposure, -200, 200), .words = automatic, .preset = "auto" },
+	  NUMBER(curve.exposure, -200, 200), .words = automatic },
 	{ 'w', "white", "X", "show X, after exposure, as white (default: 1; 4 with -c)",
 	  NUMBER(curve.white, 1e-6, 1e6) },
 	{ 'c', "compress", NULL, "compress highlights instead of cutting them off",
 	  FLAG(curve.compress) },
 	{ 'l', "layer", "NAME", "show layer NAME instead of R, G, B", TEXT(layer) },
-	{ 'b', "bits", "N", "8 or 16 bits for each channel (default: %s)", INTEGER(bits, 8, 16),
-	  .preset = "8" },
+	{ 'b', "bits", "N", "8 or 16 bits for each channel (default: %s)", INTEGER(bits, 8, 16) },
 	{ 'f', "false-colour", NULL, "show luminance in false colours, with a legend",
 	  FLAG(false_colour) },
 	{ 's', "scale", "KIND", "%s (default) or linear false colours",
-	  WORD(scale.logarithmic, scales), .preset = "log" },
+	  WORD(scale.logarithmic, scales) },
 	{ 0, "min", "X", "lower end of the false colours (default: from the picture)",
 	  NUMBER(scale.min, -1e38, 1e38) },
 	{ 0, "max", "X", "upper end of the false colours (default: from the picture)",
@@ -152,7 +151,8 @@ int main(int argc, char **argv)
 	struct cli c = { .program = "tone", .synopsis = "[OPTION]... IN.exr -o OUT.png",
 		         .about = "Turns an OpenEXR picture into a PNG to look at.",
 		         .options = option_table };
-	struct request o = { .scale = { .min = NAN, .max = NAN } };
+	struct request o = { .bits = 8, .curve.exposure = NAN,
+		             .scale = { .logarithmic = 1, .min = NAN, .max = NAN } };
 	struct image im = { 0 };
 	struct exr_file_info info = { 0 };
 	struct canvas canvas = { 0 };

@@ -18,8 +18,8 @@
 #include "tools/common/key.h"
 #include "tools/common/pattern.h"
 
-/* Where they are not given; samples at most where an error is aimed at. */
-enum { SAMPLES = 4, TARGET_SAMPLES = 64, GATHER_RAYS = 1024 };
+/* Samples of a pixel at most, where an error is aimed at and they are not given. */
+enum { TARGET_SAMPLES = 64 };
 
 /* A picture to be made. */
 struct shot {
@@ -75,34 +75,33 @@ static const struct option_spec option_table[] = {
 	  PIXELS(size), .role = OPTION_RECORDED },
 	{ 0, "eye", "X,Y,Z", "render a view from this point", VECTOR(eye), .role = OPTION_RECORDED },
 	{ 0, "target", "X,Y,Z", "point it looks at", VECTOR(target), .role = OPTION_RECORDED },
-	{ 0, "up", "X,Y,Z", "its upright direction (default: %s)", VECTOR(up), .preset = "0,1,0",
+	{ 0, "up", "X,Y,Z", "its upright direction (default: %s)", VECTOR(up),
 	  .role = OPTION_RECORDED },
 	{ 0, "fov", "DEGREES", "its vertical field of view (default: %s)", NUMBER(fov, 1e-3, 179.9),
-	  .preset = "50", .role = OPTION_RECORDED },
+	  .role = OPTION_RECORDED },
 	{ 'd', "diffuse", "METHOD",
-	  "where diffuse light comes from: mesh, %s (default), gather", WORD(method, methods),
-	  .preset = "direct" },
+	  "where diffuse light comes from: mesh, %s (default), gather", WORD(method, methods) },
 	{ 't', "error", "X", "relative standard error of pixels at which sampling stops",
 	  NUMBER(view.relative, 1e-6, 1) },
 	{ 0, "budget", "SECONDS", "as many samples and rays as fit in, for each picture",
 	  NUMBER(budget, 1e-3, 1e9) },
-	{ 0, "samples", "N", "positions in each pixel (default: 4; 1: its centre)",
+	{ 0, "samples", "N", "positions in each pixel (default: %s; 1: its centre)",
 	  INTEGER(view.samples, 1, 1 << 16) },
 	{ 0, "lobe-samples", "N",
 	  "samples of a finite lobe (default: by their noise; 0: one ray about its axis)",
 	  INTEGER(view.lobe_samples, 0, 1 << 16) },
-	{ 0, "gather-rays", "N", "rays that -d gather takes at a point (default: 1024)",
+	{ 0, "gather-rays", "N", "rays that -d gather takes at a point (default: %s)",
 	  INTEGER(view.gather_rays, 4, 1 << 20) },
 	{ 0, "depth", "N", "directional events that are followed (default: %s)",
-	  INTEGER(view.depth, 0, 100000), .preset = "32" },
-	{ 0, "cutoff", "X", "cut tails that carry less than this part (default: %s)",
-	  NUMBER(view.cutoff, 0, 1), .preset = "0.001" },
+	  INTEGER(view.depth, 0, 100000) },
+	{ 0, "cutoff", "X", "cut tails that carry less than this part (default: 0.001)",
+	  NUMBER(view.cutoff, 0, 1) },
 	{ 0, "layers", "LIST",
 	  "also diffuse,directional,emission,Z,N,element,patch,error or all",
 	  SET(view.layers, view_layer_name) },
 	{ 0, "half", NULL, "colours as 16-bit floats", FLAG(exr.half) },
 	{ 0, "compression", "METHOD", "%s (default), zip, zips, piz, rle or none",
-	  WORD(exr.compression, file_exr_compression_name), .preset = "auto" },
+	  WORD(exr.compression, file_exr_compression_name) },
 	{ 0, "mix", "NAME=X,...", "scale the light of groups by X, or X:X:X for each band",
 	  JOINED(mix) },
 	{ 0 }
@@ -123,12 +122,11 @@ static void settle(struct trace *t, int operand)
 		cli_usage(c, "--eye and --target go together");
 	if (!has_eye && (options_given(c, "up") || options_given(c, "fov")))
 		cli_usage(c, "--up and --fov belong to a view by --eye and --target");
-	if (t->budget > 0 && (t->view.relative > 0 || t->view.samples || t->view.gather_rays))
+	if (t->budget > 0 && (t->view.relative > 0 || options_given(c, "samples") ||
+	                      options_given(c, "gather-rays")))
 		cli_usage(c, "--budget goes without -t, --samples and --gather-rays, which it chooses");
-	if (!t->view.samples)
-		t->view.samples = t->view.relative > 0 ? TARGET_SAMPLES : SAMPLES;
-	if (!t->view.gather_rays)
-		t->view.gather_rays = GATHER_RAYS;
+	if (!options_given(c, "samples") && t->view.relative > 0)
+		t->view.samples = TARGET_SAMPLES;
 	for (size_t i = 0; i < t->camera.n; i++)
 		t->all |= strcmp(t->camera.item[i], "all") == 0;
 	t->view.threads = t->cli.threads;
@@ -335,7 +333,7 @@ static int render_within(const struct trace *t, const struct shot *s, const stru
 		picture_image_free(im);
 		*im = (struct image){ 0 };
 		o.samples = 1 << level;
-		o.gather_rays = GATHER_RAYS / 8 << level;
+		o.gather_rays = t->view.gather_rays / 8 << level;
 		bad = view_render(t->scene, &s->frame, &o, progress, im, v, e);
 		double now = cli_seconds(), left = t->budget - (now - begun);
 		double more = now > last ? .9 * left / (now - last) : 0;
@@ -425,7 +423,7 @@ int main(int argc, char **argv)
 		.cli = { .program = "trace", .synopsis = "[options] FILE.rad -o PICTURE.exr",
 		         .about = "Render views of a solved scene, following mirrors, panes and lobes.",
 		         .options = option_table, .uses_threads = 1, .keeps_output = 1 },
-		.view.lobe_samples = VIEW_LOBE_ENOUGH
+		.up = CAMERA_UP, .fov = CAMERA_FOV, .method = VIEW_DIRECT, .view = VIEW_OPTIONS_DEFAULT
 	};
 	struct err e = { 0 };
 	int status = 0;

@@ -87,7 +87,7 @@ static struct twopass_length length(struct mesh_size s)
 
 struct twopass_mesh_options twopass_mesh_defaults(void)
 {
-	const struct mesh_options m = MESHER_OPTIONS_DEFAULT;
+	const struct mesh_options m = MESH_OPTIONS_DEFAULT;
 	const struct gltf_options g = GLTF_OPTIONS_DEFAULT;
 
 	return (struct twopass_mesh_options){
@@ -105,7 +105,7 @@ static int size(const char *what, struct twopass_length l, struct mesh_size *s, 
 static int mesh_options(const struct twopass_mesh_options *from, struct mesh_options *m,
                         struct gltf_options *g, struct err *e)
 {
-	*m = MESHER_OPTIONS_DEFAULT;
+	*m = MESH_OPTIONS_DEFAULT;
 	*g = GLTF_OPTIONS_DEFAULT;
 	m->element_within_patch = from->element_within_patch;
 	m->normal_cone = from->normal_cone;

@@ -12,7 +12,7 @@ _Static_assert((int)TWOPASS_DIFFUSE_MESH == (int)VIEW_MESH &&
 struct twopass_view twopass_view_defaults(void)
 {
 	return (struct twopass_view){
-		.up = { 0, 1, 0 }, .fov = CAMERA_FOV, .width = CAMERA_WIDTH,
+		.up = CAMERA_UP, .fov = CAMERA_FOV, .width = CAMERA_WIDTH,
 		.height = (int)(CAMERA_WIDTH / CAMERA_ASPECT), .diffuse = TWOPASS_DIFFUSE_DIRECT,
 		.samples = VIEW_OPTIONS_DEFAULT.samples };
 }

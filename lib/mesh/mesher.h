@@ -29,7 +29,7 @@ struct mesh_options {
 	const struct progress *progress; /* or NULL */
 };
 
-#define MESHER_OPTIONS_DEFAULT \
+#define MESH_OPTIONS_DEFAULT \
 	((struct mesh_options){ .patch = { .05, 1 }, .element = { .04, 1 }, \
 	                          .element_within_patch = 1, .normal_cone = 20 })
 

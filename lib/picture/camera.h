@@ -7,8 +7,9 @@
 
 enum { CAMERA_WIDTH = 640, CAMERA_SIZE_MAX = 65536 };
 
-/* Vertical field of view, degrees, of a view that gives none. */
+/* Vertical field of view, degrees, and upright direction of a view that gives none. */
 #define CAMERA_FOV 50.
+#define CAMERA_UP { 0, 1, 0 }
 
 /* Width over height of a camera that gives none. */
 #define CAMERA_ASPECT (4. / 3)

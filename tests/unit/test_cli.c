@@ -29,20 +29,23 @@ static const char *const none[] = { "none", NULL };
 
 static const struct option_spec table[] = {
 	{ 'o', "output", "FILE", "write FILE", TEXT(output), .role = OPTION_ASIDE },
-	{ 'n', "number", "N", "how many (default %s)", INTEGER(number, 1, 10), .preset = "4" },
-	{ 0, "share", "X", "the share", NUMBER(share, 0, INFINITY), .words = none },
+	{ 'n', "number", "N", "how many (default %s)", INTEGER(number, 1, 10) },
+	{ 0, "share", "X", "the share (default %s)", NUMBER(share, 0, INFINITY), .words = none },
 	{ 'x', "extra", NULL, "more of it, %s", FLAG(extra) },
 	{ 0, "big", "N", "seed", INTEGER(big, 0, INT64_MAX) },
-	{ 0, "method", "HOW", "rays or %s (default)", WORD(method, methods), .preset = "auto" },
+	{ 0, "method", "HOW", "rays or %s (default)", WORD(method, methods) },
 	{ 0, "layers", "LIST", "Z, N, patch", SET(layers, layers) },
 	{ 0, "part", "K/N", "shard", RATIO(part) },
 	{ 0, "pixels", "WxH", "size", PIXELS(pixels) },
 	{ 0, "at", "X,Y,Z", "place", VECTOR(at) },
-	{ 0, "size", "SIZE", "length", LENGTH(size), .preset = "5%" },
+	{ 0, "size", "SIZE", "length (default %s)", LENGTH(size) },
 	{ 0, "camera", "NAME", "view", LIST(camera), .role = OPTION_RECORDED },
 	{ 0, "mix", "LIST", "groups", JOINED(mix) },
 	{ 0 }
 };
+
+/* Its method is auto. */
+static const struct demo usual = { .number = 4, .share = .25, .method = 1, .size = { .05, 1 } };
 
 static struct cli demo(void)
 {
@@ -102,7 +105,7 @@ static void run(int (*fn)(int argc, char **argv), const char *to, char **argv)
 static int parse(int argc, char **argv)
 {
 	struct cli c = demo();
-	struct demo d = { 0 };
+	struct demo d = usual;
 	int operand = options_parse(&c, argc, argv, &d);
 
 	printf("n=%d share=%g out=%s x=%d%d operands=%d q=%d v=%d j=%d", d.number, d.share,
@@ -114,7 +117,7 @@ static int parse(int argc, char **argv)
 static int parse_others(int argc, char **argv)
 {
 	struct cli c = demo();
-	struct demo d = { 0 };
+	struct demo d = usual;
 
 	options_parse(&c, argc, argv, &d);
 	printf("%s%d %llu %u %u/%u %dx%d %g,%g,%g %g%s", methods[d.method], options_given(&c, "method"),
@@ -132,7 +135,7 @@ static int parse_others(int argc, char **argv)
 static int tell(int argc, char **argv)
 {
 	struct cli c = demo();
-	struct demo d = { 0 };
+	struct demo d = usual;
 	struct err e = { 0 };
 	struct digest *digest = file_digest_new();
 	char hex[33];
@@ -181,7 +184,7 @@ static void test_options(void **state)
 	(void)state;
 	accepts("n=7 share=inf out=a x=11 operands=1 q=0 v=0 j=3",
 	        ARGS("-oa", "in", "--number=7", "--share", "inf", "-xj3"));
-	accepts("n=4 share=0 out=- x=00 operands=1 q=1 v=1 j=1", ARGS("-qv", "--threads", "1", "--", "-x"));
+	accepts("n=4 share=0.25 out=- x=00 operands=1 q=1 v=1 j=1", ARGS("-qv", "--threads", "1", "--", "-x"));
 	accepts("n=4 share=0.5 out=- x=00 operands=0 q=0 v=0 j=2", ARGS("--sha", ".5", "-j2"));
 	accepts("n=4 share=nan out=- x=00 operands=0 q=0 v=0 j=2", ARGS("--share=none", "-j2"));
 }
@@ -314,7 +317,7 @@ static void test_help(void **state)
 	    "\n"
 	    "  -o, --output FILE  write FILE\n"
 	    "  -n, --number N     how many (default 4)\n"
-	    "      --share X      the share\n"
+	    "      --share X      the share (default .25)\n"
 	    "  -x, --extra        more of it, %s\n"
 	    "      --big N        seed\n"
 	    "      --method HOW   rays or auto (default)\n"
@@ -322,7 +325,7 @@ static void test_help(void **state)
 	    "      --part K/N     shard\n"
 	    "      --pixels WxH   size\n"
 	    "      --at X,Y,Z     place\n"
-	    "      --size SIZE    length\n"
+	    "      --size SIZE    length (default 5%)\n"
 	    "      --camera NAME  view\n"
 	    "      --mix LIST     groups\n"
 	    "  -j, --threads N    threads to use (default: one for each processor)\n"

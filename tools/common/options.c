@@ -44,7 +44,8 @@ static const struct option_spec common_options[] = {
 
 struct options {
 	const struct option_spec *spec[OPTIONS_MAX];
-	int own, n; /* the program's own come first */
+	int own, n;                    /* the program's own come first */
+	char usual[OPTIONS_MAX][48];   /* their defaults, for --help */
 };
 
 static void collect(struct options *all, const struct option_spec *table)
@@ -79,32 +80,86 @@ static int label(const struct option_spec *o, char *text, size_t size)
 	                o->argument ? o->argument : "");
 }
 
-static void print_option(const struct option_spec *o, int width)
+static long integer_in(const struct option_spec *o, const void *field)
 {
-	const char *preset = o->preset ? strstr(o->help, "%s") : NULL;
+	int narrow;
+	long wide;
+
+	if (o->size == sizeof narrow) {
+		memcpy(&narrow, field, sizeof narrow);
+		return narrow;
+	}
+	memcpy(&wide, field, sizeof wide);
+	return wide;
+}
+
+/* As the help has it: .05 for 0.05. */
+static void number_text(double x, char *text, size_t size)
+{
+	int n = snprintf(text, size, "%g", x);
+
+	if (strncmp(text, "0.", 2) == 0)
+		memmove(text, text + 1, (size_t)n);
+}
+
+/* A value as one would type it; "" for those of a type that has no default. */
+static void value_text(const struct option_spec *o, const void *field, char *text, size_t size)
+{
+	const struct mesh_size *length = field;
+	const double *v = field;
+
+	switch (o->type) {
+	case OPTION_INTEGER: snprintf(text, size, "%ld", integer_in(o, field)); break;
+	case OPTION_WORD: snprintf(text, size, "%s", o->words[integer_in(o, field)]); break;
+	case OPTION_NUMBER:
+		if (o->words && isnan(*v))
+			snprintf(text, size, "%s", o->words[0]);
+		else
+			number_text(*v, text, size);
+		break;
+	case OPTION_LENGTH:
+		number_text(length->relative ? 100 * length->value : length->value, text, size - 1);
+		if (length->relative)
+			strcat(text, "%");
+		break;
+	case OPTION_VECTOR: snprintf(text, size, "%g,%g,%g", v[0], v[1], v[2]); break;
+	default: break;
+	}
+}
+
+static void note_defaults(struct options *all, const void *request)
+{
+	for (int i = 0; i < all->own; i++)
+		if (strstr(all->spec[i]->help, "%s"))
+			value_text(all->spec[i], (const char *)request + all->spec[i]->at, all->usual[i],
+			           sizeof *all->usual);
+}
+
+static void print_option(const struct option_spec *o, const char *usual, int width)
+{
+	const char *gap = *usual ? strstr(o->help, "%s") : NULL;
 	char text[256];
 
 	label(o, text, sizeof text);
 	printf("%-*s  ", width, text);
-	if (preset)
-		printf("%.*s%s%s\n", (int)(preset - o->help), o->help, o->preset, preset + 2);
+	if (gap)
+		printf("%.*s%s%s\n", (int)(gap - o->help), o->help, usual, gap + 2);
 	else
 		printf("%s\n", o->help);
 }
 
-static void print_help(const struct cli *c)
+static void print_help(const struct cli *c, const struct options *all)
 {
-	struct options all = options_of(c);
 	char text[256];
 	int width = 0;
 
-	for (int i = 0; i < all.n; i++) {
-		int n = label(all.spec[i], text, sizeof text);
+	for (int i = 0; i < all->n; i++) {
+		int n = label(all->spec[i], text, sizeof text);
 		width = n > width ? n : width;
 	}
 	printf("Usage: %s %s\n%s\n\n", c->program, c->synopsis, c->about);
-	for (int i = 0; i < all.n; i++)
-		print_option(all.spec[i], width);
+	for (int i = 0; i < all->n; i++)
+		print_option(all->spec[i], all->usual[i], width);
 }
 
 /* ---- numbers ---- */
@@ -417,7 +472,7 @@ static void take_option(struct cli *c, const struct options *all, int i, const c
 		c->given |= (uint64_t)1 << i;
 	take[o->type](c, o, text, (char *)(i < all->own ? request : (void *)c) + o->at);
 	if (c->help)
-		print_help(c);
+		print_help(c, all);
 	if (c->version)
 		printf("%s (twopass) %s\n", c->program, TWOPASS_VERSION);
 	if (c->help || c->version)
@@ -434,10 +489,7 @@ int options_parse(struct cli *c, int argc, char **argv, void *request)
 	c->argc = argc;
 	c->argv = argv;
 	c->threads = par_cpus();
-	for (int i = 0; i < all.own; i++)
-		if (all.spec[i]->preset)
-			take_option(c, &all, i, all.spec[i]->preset, request);
-	c->given = 0;
+	note_defaults(&all, request);
 	opterr = 0;
 	while ((code = getopt_long(argc, argv, t.letters, t.longs, NULL)) != -1) {
 		if (code == '?' || code == ':')

@@ -39,14 +39,12 @@ struct option_spec {
 	int letter;              /* or 0 */
 	const char *name;        /* long name; NULL ends a table */
 	const char *argument;    /* its name in --help, or NULL */
-	const char *help;        /* one line; where there is a preset, %s in it is that */
+	const char *help;        /* one line; %s in it is what the request holds before */
 	enum option_type type;
 	size_t at, size;         /* of the value in the request */
 	long least, most;
 	double min, max;
 	const char *const *words; /* up to NULL */
-	const char *preset;      /* the value where the option is not given; NULL: what the
-	                            request holds before */
 	enum option_role role;
 };
 
@@ -73,9 +71,9 @@ struct option_list {
 	const char **item; /* [n], to be freed; the texts are argv's */
 };
 
-/* Puts presets and what the command line says into the request, of the type the table of c
- * was written for, and into c. Index in argv, which is reordered and has to stay, of the
- * first operand. Prints help or version and exits 0; wrong usage exits 2. */
+/* Puts what the command line says into the request, of the type the table of c was written for,
+ * and into c. The request holds the defaults before. Index in argv, which is reordered and has
+ * to stay, of the first operand. Prints help or version and exits 0; wrong usage exits 2. */
 int options_parse(struct cli *c, int argc, char **argv, void *request);
 
 /* 1 if an option, by its long name, was on the command line. */
