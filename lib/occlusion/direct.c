@@ -94,7 +94,8 @@ struct direct_worker *occ_direct_worker_new(const struct direct *d, struct err *
 		return NULL;
 	w->d = d;
 	w->element_side = UINT32_MAX;
-	w->visible_emitter = mem_new(d->exact ? d->emitters.n : 0, sizeof *w->visible_emitter, "direct light", e);
+	w->visible_emitter =
+	    mem_new(d->exact ? d->emitters.n : 0, sizeof *w->visible_emitter, "direct light", e);
 	w->weight = mem_new(d->emitters.n, sizeof *w->weight, "direct light", e);
 	if (w->visible_emitter && w->weight)
 		return w;
@@ -139,14 +140,15 @@ static int put_occluders(struct direct_worker *w, int *used, struct visible_emit
 	if (*used + w->shaft.occluders > SHAFT_OCCLUDERS)
 		return 0;
 	for (int i = 0; i < w->shaft.occluders; i++)
-		if (occ_occluder_make(&w->d->occluders, w->shaft.occluder[i], o->f, &w->visible.occluder[*used]))
+		if (occ_occluder_make(&w->d->occluders, w->shaft.occluder[i], o->f,
+		                      &w->visible.occluder[*used]))
 			o->occluders |= (uint64_t)1 << (*used)++;
 	return 1;
 }
 
 /* What the element-side f sees of an emitter; 0 if nothing. */
-static int find_visible(struct direct_worker *w, const struct facet *f, const struct emitter *t, int *used,
-                struct visible_emitter *o)
+static int find_visible(struct direct_worker *w, const struct facet *f, const struct emitter *t,
+                        int *used, struct visible_emitter *o)
 {
 	const struct direct *d = w->d;
 	struct facet_room room;
@@ -160,7 +162,8 @@ static int find_visible(struct direct_worker *w, const struct facet *f, const st
 		return 0;
 	w->shaft.most = OCCLUDERS_MOST;
 	enum shaft_state state = occ_shaft_cull(&w->shaft, &d->occluders, from, o->f);
-	o->sampled = state == SHAFT_CROWDED || (state == SHAFT_PARTLY && !put_occluders(w, used, o));
+	o->sampled =
+	    state == SHAFT_CROWDED || (state == SHAFT_PARTLY && !put_occluders(w, used, o));
 	return state != SHAFT_HIDDEN;
 }
 
@@ -245,7 +248,8 @@ static double weighted_part(const struct emitter *t, const double x[3], const st
 		v3_sub(y, x, d);
 		double r = v3_normalise(d), there = -v3_dot(d, t->f.normal);
 		if (p.w[i] > 0 && there > 0)
-			sum += p.w[i] * lobe(there, t->exponent) * weight->at(d, weight->arg) / (r * r);
+			sum += p.w[i] * lobe(there, t->exponent) * weight->at(d, weight->arg) /
+			       (r * r);
 	}
 	return sum;
 }
@@ -380,7 +384,8 @@ static void add_ray(struct direct_worker *w, const double x[3], size_t n, const 
 		lo += w->weight[lo + half - 1] <= at ? half : 0;
 		left -= half;
 	}
-	const struct emitter *t = d->exact ? w->visible_emitter[lo].emitter : &d->emitters.emitter[lo];
+	const struct emitter *t =
+	    d->exact ? w->visible_emitter[lo].emitter : &d->emitters.emitter[lo];
 	double share = (w->weight[lo] - (lo ? w->weight[lo - 1] : 0)) / total;
 	geo_facet_point(&t->f, u[1], u[2], y);
 	v3_sub(y, x, v);
@@ -474,7 +479,8 @@ int occ_direct_at(struct direct_worker *w, const double world[3], uint64_t seed,
 	memset(h, 0, (size_t)d->m->bands * sizeof *h);
 	memset(error, 0, (size_t)d->m->bands * sizeof *error);
 	for (size_t i = 0; i < n; i++) {
-		const struct emitter *t = d->exact ? w->visible_emitter[i].emitter : &d->emitters.emitter[i];
+		const struct emitter *t =
+		    d->exact ? w->visible_emitter[i].emitter : &d->emitters.emitter[i];
 		if (!d->exact || w->visible_emitter[i].sampled)
 			sum += guess(w, t, x);
 		w->weight[i] = sum;
