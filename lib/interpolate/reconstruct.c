@@ -107,8 +107,8 @@ static void store_groups(void *arg, size_t begin, size_t end, int thread)
 
 static void run(struct reconstruct_job *j, int threads)
 {
-	/* CHUNK: work for a thread at a time. SPREADS, a count: what means still miss is averaged so
-	 * often, over that many rings of elements, so that noise cancels. A guess. */
+	/* CHUNK: work for a thread at a time. SPREADS, a count: what means still miss is averaged
+	 * so often, over that many rings of elements, so that noise cancels. A guess. */
 	enum { CHUNK = 1024, SPREADS = 3 };
 
 	par_for(j->g.groups, CHUNK, threads, interp_reconstruct_fit, j, NULL);

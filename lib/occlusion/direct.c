@@ -19,7 +19,7 @@
 /* Limits of the formula, counts. Both are guesses; trace(1) tells users of them, and the table of
  * README.md (tests/bench/report) what formula and shadow rays cost. */
 enum {
-	EXACT_MOST = 48,     /* emitters: each is looked at for each side; of more all are sampled */
+	EXACT_MOST = 48,     /* emitters: each is looked at for each side; more are all sampled */
 	OCCLUDERS_MOST = 16  /* between a side and one of them: each is clipped off at every point,
 	                        and beyond, rays cost less */
 };
@@ -119,21 +119,6 @@ int occ_direct_exact(const struct direct *d)
 
 /* ---- what stands between a side and the emitters ---- */
 
-/* The part of a facet in front of another's plane, which may be in `room`; NULL if there
- * is none. */
-static const struct facet *front_part(const struct facet *f, const struct facet *of, double near,
-                                      struct facet_room *room)
-{
-	double lowest, highest;
-
-	geo_facet_heights(f, of->normal, of->offset, &lowest, &highest);
-	if (highest <= near)
-		return NULL;
-	if (lowest >= -near)
-		return f;
-	return geo_facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
-}
-
 /* Puts the shaft's occluders behind those that the side has. 0 if there is no room. */
 static int put_occluders(struct direct_worker *w, int *used, struct visible_emitter *o)
 {
@@ -152,12 +137,12 @@ static int find_visible(struct direct_worker *w, const struct facet *f, const st
 {
 	const struct direct *d = w->d;
 	struct facet_room room;
-	const struct facet *from = front_part(f, &t->f, d->occluders.near, &room);
+	const struct facet *from = occ_facet_front(f, &t->f, d->occluders.near, &room);
 
 	o->emitter = t;
 	o->occluders = 0;
 	o->sampled = 0;
-	o->f = from ? front_part(&t->f, f, d->occluders.near, &o->room) : NULL;
+	o->f = from ? occ_facet_front(&t->f, f, d->occluders.near, &o->room) : NULL;
 	if (!o->f)
 		return 0;
 	w->shaft.most = OCCLUDERS_MOST;

@@ -57,24 +57,15 @@ static double crowded(struct exchanger *x, const struct facet *a, const struct f
 
 /* ---- a pair ---- */
 
-/* The part of a facet in front of another's plane. NULL if there is none; *points are
- * dropped where the facet is cut. */
+/* The part of a facet in front of another's plane; *points are dropped where it is cut. */
 static const struct facet *front_part(const struct facet *f, const struct facet *of, double near,
                                       struct facet_room *room, struct unoccluded_points *points)
 {
-	double lowest, highest, h = v3_dot(of->normal, f->centre) - of->offset;
+	const struct facet *part = occ_facet_front(f, of, near, room);
 
-	if (h >= f->radius)
-		return f;
-	if (h <= -f->radius)
-		return NULL;
-	geo_facet_heights(f, of->normal, of->offset, &lowest, &highest);
-	if (highest <= near)
-		return NULL;
-	if (lowest >= -near)
-		return f;
-	*points = (struct unoccluded_points){ NULL, NULL };
-	return geo_facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
+	if (part == &room->f)
+		*points = (struct unoccluded_points){ NULL, NULL };
+	return part;
 }
 
 /* Can nothing be between, and is each wholly in front of the other? What most pairs of a

@@ -180,6 +180,23 @@ int occ_facet_set_init(struct facet_set *s, const struct model *m, enum facet_pl
 	return bad || store_points(s, e) ? -1 : 0;
 }
 
+const struct facet *occ_facet_front(const struct facet *f, const struct facet *of, double near,
+                                    struct facet_room *room)
+{
+	double lowest, highest, h = v3_dot(of->normal, f->centre) - of->offset;
+
+	if (h >= f->radius)
+		return f;
+	if (h <= -f->radius)
+		return NULL;
+	geo_facet_heights(f, of->normal, of->offset, &lowest, &highest);
+	if (highest <= near)
+		return NULL;
+	if (lowest >= -near)
+		return f;
+	return geo_facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
+}
+
 void occ_facet_set_free(struct facet_set *s)
 {
 	free(s->start);

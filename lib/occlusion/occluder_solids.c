@@ -108,10 +108,11 @@ static int all_behind(const struct polygons *p, const struct solid *s, const str
 	const struct polygon *poly = p->polygon.data;
 
 	for (size_t i = 0; i < s->polygons; i++)
-		for (uint32_t k = 0; k < poly[s->polygon[i]].n; k++)
-			if (occ_plane_height(plane, occ_polygon_point(p, poly[s->polygon[i]].first + k)) >
-			    solid_near * p->near)
+		for (uint32_t k = 0; k < poly[s->polygon[i]].n; k++) {
+			const double *x = occ_polygon_point(p, poly[s->polygon[i]].first + k);
+			if (occ_plane_height(plane, x) > solid_near * p->near)
 				return 0;
+		}
 	return 1;
 }
 

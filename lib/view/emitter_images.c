@@ -11,8 +11,8 @@
 #include "lib/scatter/lobe.h"
 #include "lib/view/lobe_weight.h"
 
-/* Tolerances that float32 positions need, relative to the size of the emitter (its radius): of what is
- * not behind a mirror, and of an element in the plane of an emitter; and the cosine of 1.4e-3
+/* Tolerances that float32 positions need, relative to the radius of the emitter: of what is not
+ * behind a mirror, and of an element in the plane of an emitter; and the cosine of 1.4e-3
  * radians, up to which two planes face the same way. Guesses. */
 static const double behind = 1e-6, in_plane = 1e-5, same_way = 1 - 1e-6;
 

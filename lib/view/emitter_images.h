@@ -53,8 +53,8 @@ void view_emitter_images_choose(const struct emitter_images *s, const struct vie
 double view_emitter_images_aim(const struct emitter_images *s, const struct view_aim *a,
                                const double u[3], double dir[3], uint32_t *image);
 
-/* The density with which view_emitter_images_aim finds a point of an image at a distance, which is seen at
- * an angle of this cosine. */
+/* The density with which view_emitter_images_aim finds a point of an image at a distance, which
+ * is seen at an angle of this cosine. */
 double view_emitter_images_density(const struct emitter_images *s, const struct view_aim *a,
                                    size_t image, double way, double cosine);
 

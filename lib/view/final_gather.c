@@ -272,11 +272,25 @@ static void part_corners(const struct gather *g, const uint32_t *corner, uint32_
 		of[i] = geo_sets_find(of, i);
 }
 
+/* Stores what was found at the point of a corner. */
+static void store_corner(struct gather *g, uint32_t corner, int side, const struct corner_point *p,
+                         const struct gathered *found)
+{
+	size_t bands = (size_t)g->v->m->bands, at = (2 * (size_t)corner + (size_t)side) * bands;
+
+	for (size_t b = 0; b < bands; b++, at++) {
+		g->value[at] = (float)fmax(0, found->h[b] + p->shift[b]);
+		g->error[at] = (float)found->error[b];
+		/* How light falls off at an edge is taken from the solution, which is too coarse
+		 * to know: what is added is as uncertain as it is large. */
+		g->common[at] = (float)hypot(found->common[b], p->shift[b]);
+	}
+}
+
 static void gather_group(struct gather *g, struct gather_worker *w, size_t group, int side)
 {
 	const uint32_t *corner = &g->groups.corner[g->groups.start[group]];
 	uint32_t n = g->groups.start[group + 1] - g->groups.start[group], of[VALENCE];
-	size_t bands = (size_t)g->v->m->bands;
 	struct gathered found;
 
 	for (uint32_t from = 0; from < n; from += VALENCE) {
@@ -291,16 +305,8 @@ static void gather_group(struct gather *g, struct gather_worker *w, size_t group
 			                  rng_mix(2 * corner[from + c] + (uint32_t)side), g->o.rays,
 			                  g->o.relative, p.h, &found);
 			for (uint32_t i = c; i < some; i++)
-				for (size_t b = 0; b < bands && of[i] == c; b++) {
-					size_t at =
-					    (2 * (size_t)corner[from + i] + (size_t)side) * bands +
-					    b;
-					g->value[at] = (float)fmax(0, found.h[b] + p.shift[b]);
-					g->error[at] = (float)found.error[b];
-					/* How light falls off at an edge is taken from the solution, which is too
-					 * coarse to know: what is added is as uncertain as it is large. */
-					g->common[at] = (float)hypot(found.common[b], p.shift[b]);
-				}
+				if (of[i] == c)
+					store_corner(g, corner[from + i], side, &p, &found);
 		}
 	}
 }

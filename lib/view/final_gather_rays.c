@@ -107,15 +107,6 @@ static void aim(double frame[3][3], const float *u0, const float *u1, struct ray
 	}
 }
 
-static void hit_point(const struct model *m, uint32_t triangle, double p, double q, double x[3])
-{
-	const uint32_t *c = &m->triangle.corner[3 * (size_t)triangle];
-
-	for (size_t k = 0; k < 3; k++)
-		x[k] = (1 - p - q) * m->vertex[3 * (size_t)c[0] + k] +
-		       p * m->vertex[3 * (size_t)c[1] + k] + q * m->vertex[3 * (size_t)c[2] + k];
-}
-
 /* Has the direct light computed where ray i of a batch met something, at y. */
 static void put_close(struct gather_worker *w, const struct ray_batch *b, uint32_t i, size_t place,
                       const double y[3], double *sum)
@@ -203,7 +194,7 @@ static void go_on(struct gather_worker *w, const double x[3], const struct ray_b
 	double y[3], d[3];
 
 	if (close || i % ERRORS == 0) {
-		hit_point(t->v->m, b->triangle[i], (double)b->w[0][i], (double)b->w[1][i], y);
+		view_gather_hit(t, b, i, y);
 		v3_sub(y, x, d);
 		close = close &&
 		        v3_dot(d, d) < near_sizes * near_sizes * t->v->m->element.area[place / 2];

@@ -24,7 +24,7 @@ struct gather_worker {
 	struct gather_close close[GATHER_CLOSES];
 	uint32_t closes;
 	double normal[3];           /* of the point in work */
-	double blur[BANDS_MAX];     /* variance of radiance by the solution's stated errors, summed */
+	double blur[BANDS_MAX];     /* variance of radiance by the errors of the solution, summed */
 	double blurs;               /* over so many rays */
 	struct direct_worker *direct;
 	struct err e;

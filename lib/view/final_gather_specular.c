@@ -80,14 +80,10 @@ static int scatter(const struct view_lobe *lobe, enum lobe_kind kind, int bands,
 static void leave(const struct gather_table *t, const struct ray_batch *b, uint32_t i,
                   const double normal[3], float org[3])
 {
-	const struct model *m = t->v->m;
-	const uint32_t *c = &m->triangle.corner[3 * (size_t)b->triangle[i]];
 	struct ray_units units = ray_units(t->v->rays);
-	double p = (double)b->w[0][i], q = (double)b->w[1][i], x[3];
+	double x[3];
 
-	for (size_t k = 0; k < 3; k++)
-		x[k] = (1 - p - q) * m->vertex[3 * (size_t)c[0] + k] +
-		       p * m->vertex[3 * (size_t)c[1] + k] + q * m->vertex[3 * (size_t)c[2] + k];
+	view_gather_hit(t, b, i, x);
 	ray_leave(t->v->rays, normal, x);
 	for (int k = 0; k < 3; k++)
 		org[k] = (float)((x[k] - units.centre[k]) * units.per_unit);

@@ -7,8 +7,8 @@
 #include "lib/base/vec3.h"
 #include "lib/data/solution.h"
 
-/* A side is rough where interpolation misses so much of its irradiance, by what the solution states:
- * about as much as gathering leaves of noise. A guess. */
+/* A side is rough where interpolation misses so much of its irradiance, by what the solution
+ * states: about as much as gathering leaves of noise. A guess. */
 static const double rough_from = .02;
 
 /* Weights of corners 1 and 2 of an element's triangle at a vertex. */
@@ -166,6 +166,18 @@ void view_gather_places(const struct gather_table *t, const struct ray_batch *b,
 			__builtin_prefetch(&t->radiance[3 * (size_t)t->v->m->bands * place[i]]);
 			__builtin_prefetch(&t->kind[place[i]]);
 		}
+}
+
+void view_gather_hit(const struct gather_table *t, const struct ray_batch *b, uint32_t i,
+                     double x[3])
+{
+	const struct model *m = t->v->m;
+	const uint32_t *c = &m->triangle.corner[3 * (size_t)b->triangle[i]];
+	double p = (double)b->w[0][i], q = (double)b->w[1][i];
+
+	for (size_t k = 0; k < 3; k++)
+		x[k] = (1 - p - q) * m->vertex[3 * (size_t)c[0] + k] +
+		       p * m->vertex[3 * (size_t)c[1] + k] + q * m->vertex[3 * (size_t)c[2] + k];
 }
 
 void view_gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_t i,

@@ -34,6 +34,10 @@ void view_gather_table_free(struct gather_table *t);
 void view_gather_places(const struct gather_table *t, const struct ray_batch *b, uint32_t n,
                         uint32_t place[RAY_BATCH]);
 
+/* The point (world) that ray i of a batch met, in its triangle. */
+void view_gather_hit(const struct gather_table *t, const struct ray_batch *b, uint32_t i,
+                     double x[3]);
+
 /* Adds weight[bands] times the radiance M / pi of what ray i of a batch met. */
 void view_gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_t i,
                      uint32_t place, const double *weight, double *sum);

@@ -73,8 +73,10 @@ static void find_ceiling(struct view_scene *v)
 	for (size_t c = 0; c < 3 * m->element.n; c++) {
 		size_t material = model_patch_material(m, m->element.patch[c / 3]);
 		for (int side = 0; side < 2; side++)
-			for (int b = 0; b < m->bands && !v->side[2 * material + (size_t)side].black; b++) {
+			for (int b = 0; b < m->bands; b++) {
 				const float *h = v->all.corner + 2 * bands * c;
+				if (v->side[2 * material + (size_t)side].black)
+					break;
 				v->ceiling[b] = fmax(v->ceiling[b],
 				                     corner_ceiling(v, material, side, h, b));
 			}
