@@ -107,8 +107,8 @@ static void store_groups(void *arg, size_t begin, size_t end, int thread)
 
 static void run(struct reconstruct_job *j, int threads)
 {
-	/* CHUNK: work for a thread at a time. SPREADS, a count: what means still miss is averaged so
-	 * often, over that many rings of elements, so that noise cancels. A guess. */
+	/* CHUNK: work for a thread at a time. SPREADS, a count: what means still miss is averaged
+	 * so often, over that many rings of elements, so that noise cancels. A guess. */
 	enum { CHUNK = 1024, SPREADS = 3 };
 
 	par_for(j->g.groups, CHUNK, threads, interp_reconstruct_fit, j, NULL);
@@ -162,11 +162,14 @@ static void set_precisions(struct reconstruct_job *j, unsigned parts)
 		double *to = channels_of(j, j->precision, i, 0);
 		for (size_t b = 0; b < bands; b++) {
 			double all = s->error.sampling[i * bands + b];
-			double direct = s->error.sampling_direct ? s->error.sampling_direct[i * bands + b] : 0;
+			double direct =
+			    s->error.sampling_direct ? s->error.sampling_direct[i * bands + b] : 0;
 			double other = precision_of(all * all - direct * direct);
 			if ((size_t)j->columns > bands)
 				to[bands + b] = other;
-			to[b] = s->error.sampling_direct && parts & PART_DIRECT ? precision_of(direct * direct) : other;
+			to[b] = s->error.sampling_direct && parts & PART_DIRECT
+			            ? precision_of(direct * direct)
+			            : other;
 		}
 	}
 }
@@ -182,7 +185,8 @@ static lanes *new_rows(struct reconstruct_job *j, int number, size_t n, struct e
 static int set_columns(struct reconstruct_job *j, unsigned parts, struct err *e)
 {
 	const struct solution *s = j->s;
-	int apart = parts & PART_DIRECT && parts != PART_DIRECT && s->error.sampling && s->error.sampling_direct;
+	int apart = parts & PART_DIRECT && parts != PART_DIRECT && s->error.sampling &&
+	            s->error.sampling_direct;
 
 	j->columns = s->bands * (1 + apart);
 	j->sides = 1;
@@ -220,7 +224,8 @@ static int set_places(struct reconstruct_job *j, struct err *e)
 	for (size_t i = 0; i < m->element.n && j->place; i++) {
 		struct reconstruct_place *p = &j->place[i];
 		for (size_t k = 0; k < 3; k++)
-			v3_mad(p->centre, 1. / 3, &m->vertex[3 * (size_t)m->element.corner[3 * i + k]], p->centre);
+			v3_mad(p->centre, 1. / 3,
+			       &m->vertex[3 * (size_t)m->element.corner[3 * i + k]], p->centre);
 		memcpy(p->normal, &m->element.normal[3 * i], sizeof p->normal);
 		p->area = m->element.area[i];
 	}
@@ -273,8 +278,9 @@ int interp_reconstruct(const struct model *m, const struct solution *s, unsigned
 	if (m->element.n <= SIZE_MAX / (6 * BANDS_MAX))
 		r->corner = mem_new(m->element.n * 6 * (size_t)s->bands, sizeof *r->corner,
 		                    "irradiance at corners", e);
-	if (r->corner && !set_columns(&j, parts, e) && !interp_smooth_groups_new(m, COS_CREASE, &j.g, e) &&
-	    !new_values(&j, e) && !set_places(&j, e) && !new_scratch(&j, threads, e)) {
+	if (r->corner && !set_columns(&j, parts, e) &&
+	    !interp_smooth_groups_new(m, COS_CREASE, &j.g, e) && !new_values(&j, e) &&
+	    !set_places(&j, e) && !new_scratch(&j, threads, e)) {
 		run(&j, threads);
 		bad = 0;
 	}

@@ -34,8 +34,8 @@ struct reconstruction {
 enum { PART_DIRECT = 1, PART_CAUSTIC = 2, PART_INDIRECT = 4, PART_ALL = 7 };
 
 /* Interpolates the sum of the parts of a mask. The arrays of s->error, of the sum of
- * all, stand for those of any; they may be NULL (exact values). Light groups are summed. O(elements), the
- * same result for any number of threads. 0, or -1 and e. */
+ * all, stand for those of any; they may be NULL (exact values). Light groups are summed.
+ * O(elements), the same result for any number of threads. 0, or -1 and e. */
 int interp_reconstruct(const struct model *m, const struct solution *s, unsigned parts, int threads,
                        struct reconstruction *r, struct err *e);
 void interp_reconstruction_free(struct reconstruction *r);

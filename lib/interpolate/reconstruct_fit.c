@@ -97,8 +97,8 @@ static size_t add_ring(const struct reconstruct_job *j, struct reconstruct_scrat
 
 /* Coordinates of the elements listed from `begin` on about a vertex, in the tangent plane
  * of t and b. */
-static void place(const struct reconstruct_job *j, struct reconstruct_scratch *s, size_t begin, size_t end,
-                  const double vertex[3], const double t[3], const double b[3])
+static void place(const struct reconstruct_job *j, struct reconstruct_scratch *s, size_t begin,
+                  size_t end, const double vertex[3], const double t[3], const double b[3])
 {
 	for (size_t i = begin; i < end; i++) {
 		struct reconstruct_near *p = &s->near[i];
@@ -151,8 +151,8 @@ static inline lanes clamp(lanes x, lanes low, lanes high)
 }
 
 /* Vector v of the means of listed element i. */
-static inline lanes mean_of(const struct reconstruct_job *j, const struct reconstruct_scratch *s, size_t i,
-                            size_t v)
+static inline lanes mean_of(const struct reconstruct_job *j, const struct reconstruct_scratch *s,
+                            size_t i, size_t v)
 {
 	return j->h[s->near[i].element * j->vectors + v];
 }
@@ -204,8 +204,9 @@ static inline lanes clamped(const struct channels *c)
 
 /* How far a fit is consistent with the elements' standard errors: 1 where its
  * chi-square per degree of freedom is at most 1, falling to 0 at 2. */
-static inline lanes consistency(const struct reconstruct_job *j, const struct reconstruct_scratch *s,
-                                const struct fit *f, const struct channels *c, size_t v)
+static inline lanes consistency(const struct reconstruct_job *j,
+                                const struct reconstruct_scratch *s, const struct fit *f,
+                                const struct channels *c, size_t v)
 {
 	const lanes none = { 0 };
 	lanes chi2 = none;
@@ -240,13 +241,15 @@ static void average(const struct reconstruct_job *j, const struct reconstruct_sc
 /* Vectors that the sides modelled of a group's elements fill. */
 static size_t group_vectors(const struct reconstruct_job *j, uint32_t element)
 {
-	int two = j->sides == 2 && model_side_modelled(j->m, 2 * j->m->element.patch[element] + BACK);
+	int two =
+	    j->sides == 2 && model_side_modelled(j->m, 2 * j->m->element.patch[element] + BACK);
 
 	return lanes_vectors((size_t)j->columns << two);
 }
 
 /* Values at the vertex of a group. */
-static void solve_group(const struct reconstruct_job *j, struct reconstruct_scratch *s, size_t group)
+static void solve_group(const struct reconstruct_job *j, struct reconstruct_scratch *s,
+                        size_t group)
 {
 	uint32_t corner = j->g.corner[j->g.start[group]];
 	const double *vertex = &j->m->vertex[3 * (size_t)j->m->element.corner[corner]];

@@ -13,9 +13,9 @@
 
 /* Counts; guesses. */
 enum {
-	RINGS = 3,      /* of elements that a fit may reach */
-	NEAR_MAX = 96,  /* elements that one of them may add: three times the third of a regular grid */
-	SEEN_MAX = 4096 /* corners that may be looked at for it: bounds the time of a fan of slivers */
+	RINGS = 3,       /* of elements that a fit may reach */
+	NEAR_MAX = 96,   /* elements that one may add: three times the third of a regular grid */
+	SEEN_MAX = 4096  /* corners looked at for it: bounds the time of a fan of slivers */
 };
 
 /* Where an element is. */

@@ -19,7 +19,7 @@
 /* Limits of the formula, counts. Both are guesses; trace(1) tells users of them, and the table of
  * README.md (tests/bench/report) what formula and shadow rays cost. */
 enum {
-	EXACT_MOST = 48,     /* emitters: each is looked at for each side; of more all are sampled */
+	EXACT_MOST = 48,     /* emitters: each is looked at for each side; more are all sampled */
 	OCCLUDERS_MOST = 16  /* between a side and one of them: each is clipped off at every point,
 	                        and beyond, rays cost less */
 };
@@ -94,7 +94,8 @@ struct direct_worker *occ_direct_worker_new(const struct direct *d, struct err *
 		return NULL;
 	w->d = d;
 	w->element_side = UINT32_MAX;
-	w->visible_emitter = mem_new(d->exact ? d->emitters.n : 0, sizeof *w->visible_emitter, "direct light", e);
+	w->visible_emitter =
+	    mem_new(d->exact ? d->emitters.n : 0, sizeof *w->visible_emitter, "direct light", e);
 	w->weight = mem_new(d->emitters.n, sizeof *w->weight, "direct light", e);
 	if (w->visible_emitter && w->weight)
 		return w;
@@ -118,49 +119,36 @@ int occ_direct_exact(const struct direct *d)
 
 /* ---- what stands between a side and the emitters ---- */
 
-/* The part of a facet in front of another's plane, which may be in `room`; NULL if there
- * is none. */
-static const struct facet *front_part(const struct facet *f, const struct facet *of, double near,
-                                      struct facet_room *room)
-{
-	double lowest, highest;
-
-	geo_facet_heights(f, of->normal, of->offset, &lowest, &highest);
-	if (highest <= near)
-		return NULL;
-	if (lowest >= -near)
-		return f;
-	return geo_facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
-}
-
 /* Puts the shaft's occluders behind those that the side has. 0 if there is no room. */
 static int put_occluders(struct direct_worker *w, int *used, struct visible_emitter *o)
 {
 	if (*used + w->shaft.occluders > SHAFT_OCCLUDERS)
 		return 0;
 	for (int i = 0; i < w->shaft.occluders; i++)
-		if (occ_occluder_make(&w->d->occluders, w->shaft.occluder[i], o->f, &w->visible.occluder[*used]))
+		if (occ_occluder_make(&w->d->occluders, w->shaft.occluder[i], o->f,
+		                      &w->visible.occluder[*used]))
 			o->occluders |= (uint64_t)1 << (*used)++;
 	return 1;
 }
 
 /* What the element-side f sees of an emitter; 0 if nothing. */
-static int find_visible(struct direct_worker *w, const struct facet *f, const struct emitter *t, int *used,
-                struct visible_emitter *o)
+static int find_visible(struct direct_worker *w, const struct facet *f, const struct emitter *t,
+                        int *used, struct visible_emitter *o)
 {
 	const struct direct *d = w->d;
 	struct facet_room room;
-	const struct facet *from = front_part(f, &t->f, d->occluders.near, &room);
+	const struct facet *from = occ_facet_front(f, &t->f, d->occluders.near, &room);
 
 	o->emitter = t;
 	o->occluders = 0;
 	o->sampled = 0;
-	o->f = from ? front_part(&t->f, f, d->occluders.near, &o->room) : NULL;
+	o->f = from ? occ_facet_front(&t->f, f, d->occluders.near, &o->room) : NULL;
 	if (!o->f)
 		return 0;
 	w->shaft.most = OCCLUDERS_MOST;
 	enum shaft_state state = occ_shaft_cull(&w->shaft, &d->occluders, from, o->f);
-	o->sampled = state == SHAFT_CROWDED || (state == SHAFT_PARTLY && !put_occluders(w, used, o));
+	o->sampled =
+	    state == SHAFT_CROWDED || (state == SHAFT_PARTLY && !put_occluders(w, used, o));
 	return state != SHAFT_HIDDEN;
 }
 
@@ -245,7 +233,8 @@ static double weighted_part(const struct emitter *t, const double x[3], const st
 		v3_sub(y, x, d);
 		double r = v3_normalise(d), there = -v3_dot(d, t->f.normal);
 		if (p.w[i] > 0 && there > 0)
-			sum += p.w[i] * lobe(there, t->exponent) * weight->at(d, weight->arg) / (r * r);
+			sum += p.w[i] * lobe(there, t->exponent) * weight->at(d, weight->arg) /
+			       (r * r);
 	}
 	return sum;
 }
@@ -380,7 +369,8 @@ static void add_ray(struct direct_worker *w, const double x[3], size_t n, const 
 		lo += w->weight[lo + half - 1] <= at ? half : 0;
 		left -= half;
 	}
-	const struct emitter *t = d->exact ? w->visible_emitter[lo].emitter : &d->emitters.emitter[lo];
+	const struct emitter *t =
+	    d->exact ? w->visible_emitter[lo].emitter : &d->emitters.emitter[lo];
 	double share = (w->weight[lo] - (lo ? w->weight[lo - 1] : 0)) / total;
 	geo_facet_point(&t->f, u[1], u[2], y);
 	v3_sub(y, x, v);
@@ -474,7 +464,8 @@ int occ_direct_at(struct direct_worker *w, const double world[3], uint64_t seed,
 	memset(h, 0, (size_t)d->m->bands * sizeof *h);
 	memset(error, 0, (size_t)d->m->bands * sizeof *error);
 	for (size_t i = 0; i < n; i++) {
-		const struct emitter *t = d->exact ? w->visible_emitter[i].emitter : &d->emitters.emitter[i];
+		const struct emitter *t =
+		    d->exact ? w->visible_emitter[i].emitter : &d->emitters.emitter[i];
 		if (!d->exact || w->visible_emitter[i].sampled)
 			sum += guess(w, t, x);
 		w->weight[i] = sum;

@@ -56,8 +56,8 @@ int occ_direct_sampled(const struct direct_worker *w);
 /* The radiance that a point of a side that samples none gets straight from emitters,
  * integrated over directions with a weight, into h[bands]. Punctual lights have none. 0, or
  * -1 and e when memory is short. O(emitters x occluders between). */
-int occ_direct_weighted(struct direct_worker *w, const double x[3], const struct direct_weight *weight,
-                        double *h, struct err *e);
+int occ_direct_weighted(struct direct_worker *w, const double x[3],
+                        const struct direct_weight *weight, double *h, struct err *e);
 
 /* 1 if emitters are few enough to be looked at one by one. */
 int occ_direct_exact(const struct direct *d);

@@ -22,8 +22,9 @@ static int put_facet(struct maker *k, const struct polygons *p, const uint32_t *
                      size_t material, int side)
 {
 	const struct materials *mt = &k->m->material;
-	struct emitter t = { .f.n = n, .radiance = &mt->emission[model_material_at(mt, material, side)],
-	                     .exponent = mt->emission_exponent[2 * material + (size_t)side] };
+	struct emitter t = { .f.n = n,
+		             .radiance = &mt->emission[model_material_at(mt, material, side)],
+		             .exponent = mt->emission_exponent[2 * material + (size_t)side] };
 	double x[3];
 
 	for (int i = 0; i < n; i++) {
@@ -62,7 +63,8 @@ static int put_material(struct maker *k, size_t material, uint32_t *triangle, ui
 	for (size_t i = 0; i < m->triangle.n; i++) {
 		if (m->surface.material[m->triangle.surface[i]] != material)
 			continue;
-		memcpy(&triangle[3 * sub.triangle.n], &m->triangle.corner[3 * i], 3 * sizeof *triangle);
+		memcpy(&triangle[3 * sub.triangle.n], &m->triangle.corner[3 * i],
+		       3 * sizeof *triangle);
 		surface[sub.triangle.n++] = m->triangle.surface[i];
 	}
 	if (sub.triangle.n == 0)
@@ -74,8 +76,8 @@ static int put_material(struct maker *k, size_t material, uint32_t *triangle, ui
 	for (size_t i = 0; !bad && i < p.polygon.n; i++)
 		for (int side = FRONT; side <= BACK && !bad; side++)
 			if (bsdf_emits(&m->material, material, side))
-				bad = put_polygon(k, &p, (const struct polygon *)p.polygon.data + i, material,
-				                  side);
+				bad = put_polygon(k, &p, (const struct polygon *)p.polygon.data + i,
+				                  material, side);
 	occ_polygons_free(&p);
 	return bad;
 }

@@ -38,7 +38,8 @@ static double crowded(struct exchanger *x, const struct facet *a, const struct f
 			geo_facet_point(b, u[2], u[3], z);
 			v3_sub(z, y, d);
 			double r2 = v3_dot(d, d);
-			double w = fmax(0, v3_dot(d, a->normal)) * fmax(0, -v3_dot(d, b->normal)) / (r2 * r2);
+			double w = fmax(0, v3_dot(d, a->normal)) * fmax(0, -v3_dot(d, b->normal)) /
+			           (r2 * r2);
 			v3_mad(y, 1, x->centre, y);
 			v3_mad(z, 1, x->centre, z);
 			ray_leave(x->rays, a->normal, y);
@@ -56,36 +57,29 @@ static double crowded(struct exchanger *x, const struct facet *a, const struct f
 
 /* ---- a pair ---- */
 
-/* The part of a facet in front of another's plane. NULL if there is none; *points are
- * dropped where the facet is cut. */
+/* The part of a facet in front of another's plane; *points are dropped where it is cut. */
 static const struct facet *front_part(const struct facet *f, const struct facet *of, double near,
                                       struct facet_room *room, struct unoccluded_points *points)
 {
-	double lowest, highest, h = v3_dot(of->normal, f->centre) - of->offset;
+	const struct facet *part = occ_facet_front(f, of, near, room);
 
-	if (h >= f->radius)
-		return f;
-	if (h <= -f->radius)
-		return NULL;
-	geo_facet_heights(f, of->normal, of->offset, &lowest, &highest);
-	if (highest <= near)
-		return NULL;
-	if (lowest >= -near)
-		return f;
-	*points = (struct unoccluded_points){ NULL, NULL };
-	return geo_facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
+	if (part == &room->f)
+		*points = (struct unoccluded_points){ NULL, NULL };
+	return part;
 }
 
 /* Can nothing be between, and is each wholly in front of the other? What most pairs of a
  * convex scene are. */
-static int plainly_unoccluded(const struct exchanger *x, const struct facet *a, const struct facet *b)
+static int plainly_unoccluded(const struct exchanger *x, const struct facet *a,
+                              const struct facet *b)
 {
 	return !x->occluders->nodes && v3_dot(b->normal, a->centre) - b->offset >= a->radius &&
 	       v3_dot(a->normal, b->centre) - a->offset >= b->radius;
 }
 
-static double unoccluded_pair(struct exchanger *x, const struct facet *a, struct unoccluded_points pa,
-                         const struct facet *b, struct unoccluded_points pb, double *error)
+static double unoccluded_pair(struct exchanger *x, const struct facet *a,
+                              struct unoccluded_points pa, const struct facet *b,
+                              struct unoccluded_points pb, double *error)
 {
 	double unoccluded = geo_unoccluded_exchange(&x->unoccluded, a, pa, b, pb);
 
@@ -117,7 +111,8 @@ static double any_pair(struct exchanger *x, const struct facet_set *sa, uint32_t
 	if (state == SHAFT_PARTLY) {
 		double before = x->occluded.visible.evaluations;
 		double tolerance = x->o.absolute * fmin(fa->area, fb->area);
-		double sum = occ_occluded_exchange(&x->occluded, &x->unoccluded, &x->shaft, tolerance, x->o.most, error, e);
+		double sum = occ_occluded_exchange(&x->occluded, &x->unoccluded, &x->shaft,
+		                                   tolerance, x->o.most, error, e);
 		x->counts.partly++;
 		x->counts.evaluations += x->occluded.visible.evaluations - before;
 		return sum;

@@ -83,13 +83,19 @@ static int settle(struct integral *in, struct cell *c, const struct facet *f)
 {
 	int hidden;
 
-	c->occluders = occ_shadow_on(in->o->visible.occluder, &in->shadows, c->occluders, f, in->g, in->near,
-	                            &hidden);
+	c->occluders = occ_shadow_on(in->o->visible.occluder, &in->shadows, c->occluders, f, in->g,
+	                             in->near, &hidden);
 	if (hidden)
 		return 1;
 	if (!c->occluders)
 		in->settled += geo_unoccluded_exchange(in->unoccluded, f, none, in->g, none);
 	return !c->occluders;
+}
+
+/* The form factor from a point of a cell to what it sees of g. */
+static double visible_from(const struct integral *in, const struct cell *c, const double x[3])
+{
+	return occ_visible_exchange(&in->o->visible, x, in->f->normal, in->g, c->occluders, in->e);
 }
 
 static void measure(const struct integral *in, struct cell *c, const struct facet *f)
@@ -103,8 +109,7 @@ static void measure(const struct integral *in, struct cell *c, const struct face
 	for (int i = 0; i < p.n; i++) {
 		double at[3] = { p.x[i], p.y[i], p.z[i] };
 		if (p.w[i] > 0)
-			c->value += p.w[i] * occ_visible_exchange(&in->o->visible, at, in->f->normal, in->g, c->occluders,
-			                                          in->e);
+			c->value += p.w[i] * visible_from(in, c, at);
 	}
 	c->bright = !in->o->visible.occluded;
 }
@@ -136,7 +141,7 @@ static const struct plane *best_cut(const struct integral *in, const struct shad
  * alone is of second order, theirs of fourth. */
 static double guess_error(const struct integral *in, const struct cell *c, const struct facet *f)
 {
-	double one = f->area * occ_visible_exchange(&in->o->visible, f->centre, in->f->normal, in->g, c->occluders, in->e);
+	double one = f->area * visible_from(in, c, f->centre);
 	double off = c->value - one, guess = 4 * off * off / c->value;
 
 	return fmin(uncompared_error, fmax(guessed_error_least, guess / c->most)) * c->most;
@@ -156,7 +161,7 @@ static double doubt(const struct integral *in, struct cell *c, const struct face
 		return compared ? 0 : guess_error(in, c, f);
 	for (int k = 0; k < f->n; k++) {
 		const double *v = &f->v[3 * k];
-		double s = occ_visible_exchange(&in->o->visible, v, in->f->normal, in->g, c->occluders, in->e);
+		double s = visible_from(in, c, v);
 		double all = geo_contour_point(v, in->f->normal, in->g->n, in->g->v);
 		if (all > 0)
 			off = fmax(off, fmin(1, dark ? s / all : 1 - s / all));
@@ -183,8 +188,8 @@ static int divide(const struct integral *in, struct cell *c, struct facet_room p
 /* Is it sure that the occluders together hide all from a cell that saw nothing? */
 static int dark(const struct integral *in, const struct cell *c, const struct facet *f)
 {
-	return c->value == 0 &&
-	       occ_occluders_hide(in->o->visible.occluder, c->occluders, f, in->g, in->near, HALVINGS);
+	return c->value == 0 && occ_occluders_hide(in->o->visible.occluder, c->occluders, f, in->g,
+	                                           in->near, HALVINGS);
 }
 
 /* Replaces a cell by its parts. */
@@ -203,8 +208,8 @@ static int refine(struct integral *in, size_t i)
 	((struct cell *)cells->data)[i] = ((struct cell *)cells->data)[--cells->n];
 	for (int k = 0; k < n; k++) {
 		const struct facet *f = &room[k].f;
-		part[left] = (struct cell){ .occluders = c.occluders, .edges = c.edges, .bends = c.bends,
-		                            .most = c.most * f->area / area };
+		part[left] = (struct cell){ .occluders = c.occluders, .edges = c.edges,
+		                            .bends = c.bends, .most = c.most * f->area / area };
 		set_shape(&part[left], f);
 		if (settle(in, &part[left], f))
 			continue;
@@ -219,7 +224,8 @@ static int refine(struct integral *in, size_t i)
 	double off = fabs(sum + in->settled - before - c.value) / ((several ? 1 : 3) * left);
 	for (int k = 0; k < left; k++) {
 		double least = n == 4 ? c.error / quarters_gain_most : 0;
-		part[k].error = fmax(fmax(off, least), doubt(in, &part[k], shape_of(&part[k]), n == 4));
+		part[k].error =
+		    fmax(fmax(off, least), doubt(in, &part[k], shape_of(&part[k]), n == 4));
 	}
 	return mem_append(cells, part, (size_t)left, sizeof *part, in->e);
 }
@@ -266,7 +272,8 @@ static void make_occluders(struct occluded *o, const struct shaft *l, const stru
 {
 	o->occluders = 0;
 	for (int i = 0; i < l->occluders; i++)
-		o->occluders += occ_occluder_make(l->set, l->occluder[i], g, &o->visible.occluder[o->occluders]);
+		o->occluders += occ_occluder_make(l->set, l->occluder[i], g,
+		                                  &o->visible.occluder[o->occluders]);
 }
 
 /* How near the occluders come to a facet: its points' shadows then change quickly. */
@@ -276,16 +283,19 @@ static double clearance(const struct occluded *o, const struct facet *f)
 
 	for (int i = 0; i < o->occluders; i++)
 		for (int k = 0; k < o->visible.occluder[i].corners; k++)
-			least = fmin(least, fmax(0, v3_dot(f->normal, o->visible.occluder[i].corner[k]) -
-			                            f->offset));
+			least = fmin(least,
+			             fmax(0, v3_dot(f->normal, o->visible.occluder[i].corner[k]) -
+			                         f->offset));
 	return least;
 }
 
-double occ_occluded_exchange(struct occluded *o, struct unoccluded *unoccluded, const struct shaft *l,
-                             double tolerance, int most, double *error, struct err *e)
+double occ_occluded_exchange(struct occluded *o, struct unoccluded *unoccluded,
+                             const struct shaft *l, double tolerance, int most, double *error,
+                             struct err *e)
 {
-	struct integral in = { .o = o, .unoccluded = unoccluded, .f = l->a, .g = l->b, .near = l->set->near,
-	                       .e = e };
+	struct integral in = {
+		.o = o, .unoccluded = unoccluded, .f = l->a, .g = l->b, .near = l->set->near, .e = e
+	};
 
 	make_occluders(o, l, l->b);
 	if (clearance(o, l->a) < clearance(o, l->b)) {
@@ -300,7 +310,8 @@ double occ_occluded_exchange(struct occluded *o, struct unoccluded *unoccluded, 
 	double whole = geo_unoccluded_exchange(unoccluded, in.f, none, in.g, none);
 	in.cut = tolerance < 2 * edge_error * whole; /* 2: a guess */
 	if (in.cut)
-		occ_shadow_edges(o->visible.occluder, o->occluders, in.f, in.g, in.near, &in.shadows);
+		occ_shadow_edges(o->visible.occluder, o->occluders, in.f, in.g, in.near,
+		                 &in.shadows);
 	if (put_whole(&in, all & ~in.shadows.idle, whole))
 		return NAN;
 	double visible = integrate(&in, tolerance, most, error);

@@ -20,7 +20,8 @@ void occ_occluded_free(struct occluded *o);
 /* Exchange area, m^2, of the facets of a shaft found SHAFT_PARTLY, to an absolute
  * error of `tolerance` m^2 if `most` evaluations of what a point sees reach that; the
  * error estimate goes to *error. NaN and e when memory is short. */
-double occ_occluded_exchange(struct occluded *o, struct unoccluded *unoccluded, const struct shaft *l,
-                             double tolerance, int most, double *error, struct err *e);
+double occ_occluded_exchange(struct occluded *o, struct unoccluded *unoccluded,
+                             const struct shaft *l, double tolerance, int most, double *error,
+                             struct err *e);
 
 #endif

@@ -79,9 +79,11 @@ static int convex_outline(const struct model *m, uint32_t patch, uint32_t *corne
 	uint64_t begin = m->patch.loop_start[loop], size = m->patch.loop_start[loop + 1] - begin;
 	const double *front = &m->element.normal[3 * (size_t)m->patch.start[patch]];
 	for (uint64_t i = 0; i < size; i++) {
-		const double *a = &m->vertex[3 * (size_t)m->patch.loop_index[begin + (i + size - 1) % size]];
+		const double *a =
+		    &m->vertex[3 * (size_t)m->patch.loop_index[begin + (i + size - 1) % size]];
 		const double *b = &m->vertex[3 * (size_t)m->patch.loop_index[begin + i]];
-		const double *c = &m->vertex[3 * (size_t)m->patch.loop_index[begin + (i + 1) % size]];
+		const double *c =
+		    &m->vertex[3 * (size_t)m->patch.loop_index[begin + (i + 1) % size]];
 		double u[3], v[3], turn[3];
 		v3_sub(b, a, u);
 		v3_sub(c, b, v);
@@ -142,7 +144,8 @@ static int store_points(struct facet_set *s, struct err *e)
 		geo_pair_fill(&s->facet[i], &s->pair[i]);
 		for (int l = 0; l < levels; l++) {
 			size_t n = (size_t)geo_cubature_points(s->facet[i].n, l);
-			s->stored[i][l] = (struct cubature){ 0, at, at + n, at + 2 * n, at + 3 * n };
+			s->stored[i][l] =
+			    (struct cubature){ 0, at, at + n, at + 2 * n, at + 3 * n };
 			geo_cubature_fill(&s->facet[i], l, &s->stored[i][l]);
 			at += 4 * n;
 		}
@@ -175,6 +178,23 @@ int occ_facet_set_init(struct facet_set *s, const struct model *m, enum facet_pl
 		geo_facet_measure(&s->facet[i]);
 	}
 	return bad || store_points(s, e) ? -1 : 0;
+}
+
+const struct facet *occ_facet_front(const struct facet *f, const struct facet *of, double near,
+                                    struct facet_room *room)
+{
+	double lowest, highest, h = v3_dot(of->normal, f->centre) - of->offset;
+
+	if (h >= f->radius)
+		return f;
+	if (h <= -f->radius)
+		return NULL;
+	geo_facet_heights(f, of->normal, of->offset, &lowest, &highest);
+	if (highest <= near)
+		return NULL;
+	if (lowest >= -near)
+		return f;
+	return geo_facet_clip(f, of->normal, of->offset, room) ? &room->f : NULL;
 }
 
 void occ_facet_set_free(struct facet_set *s)

@@ -32,4 +32,9 @@ int occ_facet_set_init(struct facet_set *s, const struct model *m, enum facet_pl
                        struct err *e);
 void occ_facet_set_free(struct facet_set *s);
 
+/* The part of a facet in front of another's plane, heights up to `near` being none: f itself, a
+ * part of it in `room`, or NULL. */
+const struct facet *occ_facet_front(const struct facet *f, const struct facet *of, double near,
+                                    struct facet_room *room);
+
 #endif

@@ -88,7 +88,8 @@ int occ_occluder_make(const struct occluder_set *s, uint32_t occluder, const str
 		if (cut.points[i] == 2) {
 			v3_sub(cut.point[i][1], cut.point[i][0], along);
 			v3_normalise(along);
-			put_edge(out, cut.point[i][0], cut.point[i][1], along, i, b->flat ? i : out->faces);
+			put_edge(out, cut.point[i][0], cut.point[i][1], along, i,
+			         b->flat ? i : out->faces);
 		}
 	for (int k = 0; k < 3; k++) {
 		out->centre[k] = 0;

@@ -66,7 +66,8 @@ static int clip(double (*v)[3], int n, const struct plane *p, double near)
 		double ha = occ_plane_height(p, a) + near, hb = occ_plane_height(p, b) + near;
 		if (ha <= 0 && m < FLAT_CORNERS + OCCLUDER_SHAPE_FACES)
 			memcpy(kept[m++], a, sizeof *kept);
-		if (((ha < 0 && hb > 0) || (ha > 0 && hb < 0)) && m < FLAT_CORNERS + OCCLUDER_SHAPE_FACES)
+		if (((ha < 0 && hb > 0) || (ha > 0 && hb < 0)) &&
+		    m < FLAT_CORNERS + OCCLUDER_SHAPE_FACES)
 			geo_edge_divide(a, ha, b, hb, kept[m++]);
 	}
 	memcpy(v, kept, (size_t)m * sizeof *kept);

@@ -45,8 +45,9 @@ static void bound(const struct maker *k, struct occluder_shape *b)
 
 static void begin_shape(const struct maker *k, struct occluder_shape *b)
 {
-	*b = (struct occluder_shape){ .corner = (uint32_t)k->corner.n / 3, .edge = (uint32_t)k->edge.n,
-	                    .face = (uint32_t)k->face.n };
+	*b = (struct occluder_shape){ .corner = (uint32_t)k->corner.n / 3,
+		                      .edge = (uint32_t)k->edge.n,
+		                      .face = (uint32_t)k->face.n };
 }
 
 static int end_shape(struct maker *k, struct occluder_shape *b)
@@ -97,7 +98,8 @@ static int put_flat(struct maker *k, uint32_t polygon)
 	b.flat = 1;
 	for (uint32_t i = 0; i < q->n; i++) {
 		struct occluder_edge edge = { .a = b.corner + i, .b = b.corner + (i + 1) % q->n };
-		if (mem_append(&k->corner, occ_polygon_point(&k->p, q->first + i), 3, sizeof(double), k->e) ||
+		if (mem_append(&k->corner, occ_polygon_point(&k->p, q->first + i), 3,
+		               sizeof(double), k->e) ||
 		    mem_append(&k->edge, &edge, 1, sizeof edge, k->e))
 			return -1;
 	}
@@ -105,8 +107,8 @@ static int put_flat(struct maker *k, uint32_t polygon)
 }
 
 /* The number of a point in an occluder under way, added if it is new. */
-static int shape_corner(struct maker *k, const struct occluder_shape *b, uint32_t *known, uint32_t *n,
-                       uint32_t point, uint32_t *corner)
+static int shape_corner(struct maker *k, const struct occluder_shape *b, uint32_t *known,
+                        uint32_t *n, uint32_t point, uint32_t *corner)
 {
 	uint32_t i = 0;
 

@@ -7,6 +7,10 @@
 #include "lib/base/vec3.h"
 #include "lib/geometry/half_edge.h"
 
+/* Corners of a solid may be above its faces by so many times the height that counts as none: a face
+ * is off by one, a corner by another. */
+static const double solid_near = 2;
+
 static int by_points(const void *a, const void *b)
 {
 	const struct side *x = a, *y = b;
@@ -52,7 +56,8 @@ int occ_solids_group(const struct polygons *p, uint32_t *set, struct side **side
 		}
 	qsort(side, n, sizeof *side, by_points);
 	for (size_t i = 0, end; i < n; i = end) {
-		for (end = i + 1; end < n && side[end].low == side[i].low && side[end].high == side[i].high;)
+		for (end = i + 1;
+		     end < n && side[end].low == side[i].low && side[end].high == side[i].high;)
 			end++;
 		const struct polygon *a = &poly[side[i].polygon], *b = &poly[side[end - 1].polygon];
 		if (end - i == 2 && side[i].up != side[i + 1].up && behind(p, a, &b->plane) &&
@@ -103,10 +108,11 @@ static int all_behind(const struct polygons *p, const struct solid *s, const str
 	const struct polygon *poly = p->polygon.data;
 
 	for (size_t i = 0; i < s->polygons; i++)
-		for (uint32_t k = 0; k < poly[s->polygon[i]].n; k++)
-			if (occ_plane_height(plane, occ_polygon_point(p, poly[s->polygon[i]].first + k)) >
-			    2 * p->near)
+		for (uint32_t k = 0; k < poly[s->polygon[i]].n; k++) {
+			const double *x = occ_polygon_point(p, poly[s->polygon[i]].first + k);
+			if (occ_plane_height(plane, x) > solid_near * p->near)
 				return 0;
+		}
 	return 1;
 }
 
@@ -123,8 +129,9 @@ int occ_solid_check(const struct polygons *p, struct solid *s)
 		if (!all_behind(p, s, &poly[s->polygon[i]].plane))
 			return 0;
 	for (size_t i = 0; i < s->sides; i++)
-		if (lone(s, i) && fabs(occ_plane_height(&s->missing, &p->point[3 * (size_t)s->side[i].low])) >
-		                  2 * p->near)
+		if (lone(s, i) &&
+		    fabs(occ_plane_height(&s->missing, &p->point[3 * (size_t)s->side[i].low])) >
+		        solid_near * p->near)
 			return 0;
 	/* The ends of a tube cancel in the sum. */
 	return s->closed || (open >= 3 && v3_dot(s->missing.normal, s->missing.normal) > 0 &&

@@ -160,7 +160,8 @@ static void find_idle(struct cuts *c, const struct occluder *b, int number)
 		struct faces of_x = faces_from(b, &c->f->v[3 * j], c->near);
 		for (int i = 0; i < b->edges && !(c->s->idle >> number & 1); i++)
 			if (!within(b, i, of_x) &&
-			    plane_through(b->edge[i].a, b->edge[i].along, &c->f->v[3 * j], c->near, &p) &&
+			    plane_through(b->edge[i].a, b->edge[i].along, &c->f->v[3 * j], c->near,
+			                  &p) &&
 			    side_of(&p, c->f->v, c->f->n, c->near))
 				consider(c, b, number, &p, 0);
 	}
@@ -231,7 +232,8 @@ static void occluder_cuts(struct cuts *c, const struct occluder *b, int number)
 
 /* Planes through parallel edges of two occluders with one on each side: the gap between them
  * opens there. */
-static void gap_cuts(struct cuts *c, const struct occluder *a, const struct occluder *b, uint64_t of)
+static void gap_cuts(struct cuts *c, const struct occluder *a, const struct occluder *b,
+                     uint64_t of)
 {
 	struct plane p;
 
@@ -239,7 +241,8 @@ static void gap_cuts(struct cuts *c, const struct occluder *a, const struct occl
 		struct faces of_x = faces_from(a, b->edge[j].a, c->near);
 		for (int i = 0; i < a->edges; i++)
 			if (parallel(a->edge[i].along, b->edge[j].along) && !within(a, i, of_x) &&
-			    plane_through(a->edge[i].a, a->edge[i].along, b->edge[j].a, c->near, &p) &&
+			    plane_through(a->edge[i].a, a->edge[i].along, b->edge[j].a, c->near,
+			                  &p) &&
 			    !side_of(&p, c->f->v, c->f->n, c->near) &&
 			    occluder_side(a, &p, c->near) * occluder_side(b, &p, c->near) < 0)
 				add(c, &c->s->edges, &p, of);
@@ -257,7 +260,8 @@ static void meeting_cuts(struct cuts *c, const struct occluder *a, const struct 
 		struct faces of_x = faces_from(a, b->corner[j], c->near);
 		for (int i = 0; i < a->edges; i++) {
 			if (within(a, i, of_x) ||
-			    !plane_through(a->edge[i].a, a->edge[i].along, b->corner[j], c->near, &p) ||
+			    !plane_through(a->edge[i].a, a->edge[i].along, b->corner[j], c->near,
+			                   &p) ||
 			    side_of(&p, c->f->v, c->f->n, c->near))
 				continue;
 			int side = occluder_side(a, &p, c->near);

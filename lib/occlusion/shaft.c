@@ -71,7 +71,8 @@ int occ_shaft_planes(const struct facet *f, const struct facet *g, double near,
 /* ---- occluders in it ---- */
 
 /* Is all of an occluder on or behind a facet's plane, so that it hides nothing? */
-static int behind_facet(const struct occluder_set *s, const struct occluder_shape *b, const struct facet *f)
+static int behind_facet(const struct occluder_set *s, const struct occluder_shape *b,
+                        const struct facet *f)
 {
 	const double *x = &s->corner[3 * (size_t)b->corner];
 
@@ -82,7 +83,8 @@ static int behind_facet(const struct occluder_set *s, const struct occluder_shap
 }
 
 /* Is a facet in a solid, or a part of its faces, as a whole? */
-static int holds(const struct occluder_set *s, const struct occluder_shape *b, const struct facet *f)
+static int holds(const struct occluder_set *s, const struct occluder_shape *b,
+                 const struct facet *f)
 {
 	for (uint32_t i = 0; i < b->faces && !b->flat; i++)
 		for (int c = 0; c < f->n; c++)
@@ -193,8 +195,8 @@ static int one_hides(const struct shaft *l)
 	return 0;
 }
 
-enum shaft_state occ_shaft_cull(struct shaft *l, const struct occluder_set *set, const struct facet *a,
-                          const struct facet *b)
+enum shaft_state occ_shaft_cull(struct shaft *l, const struct occluder_set *set,
+                                const struct facet *a, const struct facet *b)
 {
 	l->set = set;
 	l->a = a;

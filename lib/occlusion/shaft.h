@@ -29,8 +29,8 @@ struct shaft {
 /* Looks from a to b, which lie in front of one another; l->most is set. With SHAFT_PARTLY the
  * occluders that may hide something are in l->occluder.
  * O(log occluders + occluders between x corners). */
-enum shaft_state occ_shaft_cull(struct shaft *l, const struct occluder_set *set, const struct facet *a,
-                          const struct facet *b);
+enum shaft_state occ_shaft_cull(struct shaft *l, const struct occluder_set *set,
+                                const struct facet *a, const struct facet *b);
 
 /* Planes that have both facets on or behind them, through an edge of one and a corner of
  * the other. Returns their number. */

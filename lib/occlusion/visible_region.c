@@ -133,7 +133,8 @@ static int sides_of(const struct point_polygon *p, const double n[3], double zer
 	int above = 0, below = 0;
 
 	for (int i = 0; i < p->n; i += 4) {
-		four h = n[0] * four_load(p->x + i) + n[1] * four_load(p->y + i) + n[2] * four_load(p->z + i);
+		four h = n[0] * four_load(p->x + i) + n[1] * four_load(p->y + i) +
+		         n[2] * four_load(p->z + i);
 		above |= four_bits(h > zero);
 		below |= four_bits(h < -zero);
 	}
@@ -150,7 +151,8 @@ static void plane_of(const struct visible_point *s, int number, int edge, double
 
 /* Does an occluder hide nothing of a polygon, as it is all beyond an edge? Else a bit in
  * *across for each edge that cuts it. */
-static int apart(const struct visible_point *s, int number, const struct point_polygon *p, uint64_t *across)
+static int apart(const struct visible_point *s, int number, const struct point_polygon *p,
+                 uint64_t *across)
 {
 	*across = 0;
 	for (int i = 0; i < s->outline[number].edges; i++) {
@@ -192,7 +194,8 @@ static const struct point_polygon *hidden_part(struct visible_point *s, int numb
 	return p;
 }
 
-static double visible(struct visible_point *s, const struct point_polygon *p, const uint8_t *occluders, int n);
+static double visible(struct visible_point *s, const struct point_polygon *p,
+                      const uint8_t *occluders, int n);
 
 /* What is visible of a polygon that many occluders hide parts of: what the last one leaves,
  * piece by piece. */
@@ -211,7 +214,8 @@ static double piecewise(struct visible_point *s, const struct point_polygon *p, 
 }
 
 /* The form factor of what the occluders leave of a polygon. */
-static double visible(struct visible_point *s, const struct point_polygon *p, const uint8_t *occluders, int n)
+static double visible(struct visible_point *s, const struct point_polygon *p,
+                      const uint8_t *occluders, int n)
 {
 	uint8_t left[SHAFT_OCCLUDERS];
 	uint64_t across[SHAFT_OCCLUDERS];
@@ -244,8 +248,8 @@ static double visible(struct visible_point *s, const struct point_polygon *p, co
 	return sum > rounding * whole ? sum : 0;
 }
 
-static double measure_visible(struct visible_point *s, const double x[3], const struct facet *g, uint64_t occluders,
-                   struct err *e)
+static double measure_visible(struct visible_point *s, const double x[3], const struct facet *g,
+                              uint64_t occluders, struct err *e)
 {
 	struct point_polygon whole;
 	uint8_t list[SHAFT_OCCLUDERS];
@@ -278,8 +282,8 @@ static double factor(const struct point_polygon *p, void *normal)
 	return geo_point_polygon_factor(p, normal);
 }
 
-double occ_visible_exchange(struct visible_point *s, const double x[3], const double normal[3], const struct facet *g,
-                            uint64_t occluders, struct err *e)
+double occ_visible_exchange(struct visible_point *s, const double x[3], const double normal[3],
+                            const struct facet *g, uint64_t occluders, struct err *e)
 {
 	double n[3] = { normal[0], normal[1], normal[2] };
 
@@ -289,8 +293,8 @@ double occ_visible_exchange(struct visible_point *s, const double x[3], const do
 	return measure_visible(s, x, g, occluders, e);
 }
 
-double occ_visible_integrate(struct visible_point *s, const double x[3], const struct facet *g, uint64_t occluders,
-                             visible_measure measure, void *arg, struct err *e)
+double occ_visible_integrate(struct visible_point *s, const double x[3], const struct facet *g,
+                             uint64_t occluders, visible_measure measure, void *arg, struct err *e)
 {
 	s->measure = measure;
 	s->arg = arg;

@@ -48,11 +48,11 @@ void occ_visible_begin(struct visible_point *s, int occluders, double near);
 /* The form factor from a point x with a unit normal to what it sees of facet g, which is
  * in front of it; exact. occluders: a bit for each that may hide something. NaN and e when
  * polygons have too many corners. */
-double occ_visible_exchange(struct visible_point *s, const double x[3], const double normal[3], const struct facet *g,
-                            uint64_t occluders, struct err *e);
+double occ_visible_exchange(struct visible_point *s, const double x[3], const double normal[3],
+                            const struct facet *g, uint64_t occluders, struct err *e);
 
 /* The same for any measure: its sum over convex polygons that are together what is seen. */
-double occ_visible_integrate(struct visible_point *s, const double x[3], const struct facet *g, uint64_t occluders,
-                             visible_measure measure, void *arg, struct err *e);
+double occ_visible_integrate(struct visible_point *s, const double x[3], const struct facet *g,
+                             uint64_t occluders, visible_measure measure, void *arg, struct err *e);
 
 #endif

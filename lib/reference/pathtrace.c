@@ -33,8 +33,8 @@ static double side_flux(struct pathtrace *p, size_t triangle, int side)
 	double sum = 0;
 
 	for (int b = 0; b < p->m->bands; b++) {
-		double flux = p->area[triangle] * bsdf_exitance(&p->m->material,
-		                                                material_of(p->m, triangle), side, b);
+		double flux = p->area[triangle] *
+		              bsdf_exitance(&p->m->material, material_of(p->m, triangle), side, b);
 		p->emitted[b] += flux;
 		sum += flux;
 	}

@@ -11,11 +11,11 @@
 /* Counts. They change noise and time, never the expectation; guesses. */
 enum {
 	FREE_BOUNCES = 4,   /* before Russian roulette begins: what is most of a picture's light */
-	PASSES_MAX = 4096,  /* surfaces in a row that a straight ray may pass: more than any scene has,
-	                       so that rounding cannot hold a path for ever */
+	PASSES_MAX = 4096,  /* surfaces in a row that a straight ray may pass: more than any scene
+	                       has, so that rounding cannot hold a path for ever */
 	LIGHTS_ALL = 16,    /* lights and images that are all looked at */
-	BATCHES = 8         /* of a pixel's samples, for its standard error, known then to 27 %: each
-	                       is stratified by itself, so fewer would be less noisy and less known */
+	BATCHES = 8         /* of a pixel's samples, for its standard error, known then to 27 %;
+	                       each is stratified by itself, so fewer are less noisy and less known */
 };
 
 /* Work for a thread at a time, pixels. */
@@ -348,7 +348,8 @@ int pathtrace_picture(const struct pathtrace *p, const struct view_frame *f,
 
 	if (new_picture(&j, e))
 		return -1;
-	par_for((size_t)f->width * (size_t)f->height, PIXELS_AT_ONCE, o->threads, render_pixels, &j, progress);
+	par_for((size_t)f->width * (size_t)f->height, PIXELS_AT_ONCE, o->threads, render_pixels, &j,
+	        progress);
 	if (relative_error)
 		*relative_error = o->samples < 2 ? (double)INFINITY
 		                                 : relative_rms(picture, 3 + band_channels(p->m));

@@ -11,8 +11,8 @@
 #include "lib/scatter/lobe.h"
 #include "lib/view/lobe_weight.h"
 
-/* Tolerances that float32 positions need, relative to the size of the emitter (its radius): of what is
- * not behind a mirror, and of an element in the plane of an emitter; and the cosine of 1.4e-3
+/* Tolerances that float32 positions need, relative to the radius of the emitter: of what is not
+ * behind a mirror, and of an element in the plane of an emitter; and the cosine of 1.4e-3
  * radians, up to which two planes face the same way. Guesses. */
 static const double behind = 1e-6, in_plane = 1e-5, same_way = 1 - 1e-6;
 
@@ -52,8 +52,8 @@ static int make_images(struct emitter_images *s, const struct model *m, struct e
 		if (bsdf_any_pane(&m->material))
 			s->image[i] = s->emitters.emitter[i].f;
 		for (size_t k = 0; k < s->mirrors.n; k++, used += 3 * FACET_CORNERS)
-			turn(&s->emitters.emitter[i].f, &s->mirrors.plane[k], s->centre, s->corner + used,
-			     &s->image[(k + 1) * emitters + i]);
+			turn(&s->emitters.emitter[i].f, &s->mirrors.plane[k], s->centre,
+			     s->corner + used, &s->image[(k + 1) * emitters + i]);
 	}
 	return 0;
 }
@@ -74,7 +74,8 @@ static int inside(const struct facet *f, const double x[3])
 }
 
 /* The emitter that an element-side is part of. */
-static uint32_t emitter_of(const struct emitter_images *s, const struct model *m, size_t element, int side)
+static uint32_t emitter_of(const struct emitter_images *s, const struct model *m, size_t element,
+                           int side)
 {
 	const double *n = &m->element.normal[3 * element];
 	double x[3] = { -s->centre[0], -s->centre[1], -s->centre[2] };
@@ -120,8 +121,8 @@ void view_emitter_images_free(struct emitter_images *s)
 	free(s->of);
 }
 
-int view_emitter_images_plane(const struct emitter_images *s, uint32_t material, int side, const double n[3],
-                              const double x[3])
+int view_emitter_images_plane(const struct emitter_images *s, uint32_t material, int side,
+                              const double n[3], const double x[3])
 {
 	double out[3];
 
@@ -153,13 +154,15 @@ static double guess(const struct emitter_images *s, size_t i, const struct view_
 	double r2 = v3_dot(d, d), near = fmax(r2, f->radius * f->radius), r = sqrt(near);
 	if (v3_dot(l->normal, d) + f->radius <= 0)
 		return 0;
-	double off = acos(fmax(-1, fmin(1, v3_dot(l->axis, d) / sqrt(r2)))) - asin(fmin(1, f->radius / r));
-	double power = bsdf_lobe_power(l->k, cos(fmax(0, off))), part = (l->k + 1) * fmin(t->f.area / near, 1);
+	double off =
+	    acos(fmax(-1, fmin(1, v3_dot(l->axis, d) / sqrt(r2)))) - asin(fmin(1, f->radius / r));
+	double power = bsdf_lobe_power(l->k, cos(fmax(0, off)));
+	double part = (l->k + 1) * fmin(t->f.area / near, 1);
 	return t->power / t->f.area * fmin(1, there / r) * fmin(part, 1) * power;
 }
 
-void view_emitter_images_choose(const struct emitter_images *s, const struct view_lobe_seen *l, double enough,
-                                struct view_aim *a)
+void view_emitter_images_choose(const struct emitter_images *s, const struct view_lobe_seen *l,
+                                double enough, struct view_aim *a)
 {
 	a->sum = 0;
 	v3_sub(l->x, s->centre, a->x);
@@ -177,14 +180,15 @@ void view_emitter_images_choose(const struct emitter_images *s, const struct vie
 		a->sum = 0;
 }
 
-double view_emitter_images_density(const struct emitter_images *s, const struct view_aim *a, size_t image,
-                                   double way, double cosine)
+double view_emitter_images_density(const struct emitter_images *s, const struct view_aim *a,
+                                   size_t image, double way, double cosine)
 {
-	return a->guess[image] / a->sum * way * way / (fmax(cosine, cosine_least) * s->image[image].area);
+	return a->guess[image] / a->sum * way * way /
+	       (fmax(cosine, cosine_least) * s->image[image].area);
 }
 
-double view_emitter_images_aim(const struct emitter_images *s, const struct view_aim *a, const double u[3],
-                               double dir[3], uint32_t *image)
+double view_emitter_images_aim(const struct emitter_images *s, const struct view_aim *a,
+                               const double u[3], double dir[3], uint32_t *image)
 {
 	double at = u[0] * a->sum, y[3];
 	size_t i = 0, last = 0;

@@ -45,21 +45,21 @@ struct view_aim {
 };
 
 /* O(images). `enough`: radiance that is worth aiming at. */
-void view_emitter_images_choose(const struct emitter_images *s, const struct view_lobe_seen *l, double enough,
-                                struct view_aim *a);
+void view_emitter_images_choose(const struct emitter_images *s, const struct view_lobe_seen *l,
+                                double enough, struct view_aim *a);
 
 /* A direction towards a point of some image, from three numbers in [0,1): its density, and
  * the image. 0 if it is edge on. */
-double view_emitter_images_aim(const struct emitter_images *s, const struct view_aim *a, const double u[3],
-                               double dir[3], uint32_t *image);
+double view_emitter_images_aim(const struct emitter_images *s, const struct view_aim *a,
+                               const double u[3], double dir[3], uint32_t *image);
 
-/* The density with which view_emitter_images_aim finds a point of an image at a distance, which is seen at
- * an angle of this cosine. */
-double view_emitter_images_density(const struct emitter_images *s, const struct view_aim *a, size_t image,
-                                   double way, double cosine);
+/* The density with which view_emitter_images_aim finds a point of an image at a distance, which
+ * is seen at an angle of this cosine. */
+double view_emitter_images_density(const struct emitter_images *s, const struct view_aim *a,
+                                   size_t image, double way, double cosine);
 
 /* The mirror plane that a point of a side with front normal n is on, or -1. */
-int view_emitter_images_plane(const struct emitter_images *s, uint32_t material, int side, const double n[3],
-                              const double x[3]);
+int view_emitter_images_plane(const struct emitter_images *s, uint32_t material, int side,
+                              const double n[3], const double x[3]);
 
 #endif

@@ -36,7 +36,8 @@ struct gather {
 	struct half_edges edges;
 	unsigned char *wanted;  /* [groups][2] */
 	unsigned char *asked;   /* [2 elements] */
-	float *value, *error;   /* [elements][3 corners][2][bands] irradiance, standard error, and */
+	float *value;           /* [elements][3 corners][2][bands] irradiance, */
+	float *error;           /* its standard error, and */
 	float *common;          /* what that has of errors of the solution */
 	float *miss;            /* [2 elements][bands] of interpolation */
 	struct gather_table table;
@@ -56,7 +57,8 @@ static int new_arrays(struct gather *g, struct err *e)
 	g->common = mem_new(6 * n, bands * sizeof *g->common, "gathering", e);
 	g->miss = mem_new(2 * n, bands * sizeof *g->miss, "gathering", e);
 	g->worker = mem_new((size_t)g->o.threads, sizeof *g->worker, "gathering", e);
-	if (!g->wanted || !g->asked || !g->value || !g->error || !g->common || !g->miss || !g->worker)
+	if (!g->wanted || !g->asked || !g->value || !g->error || !g->common || !g->miss ||
+	    !g->worker)
 		return -1;
 	for (int t = 0; t < g->o.threads; t++)
 		if (view_gather_worker_init(&g->worker[t], &g->table, g->v, g->o.depth, e))
@@ -76,7 +78,8 @@ struct gather *view_gather_new(const struct view_scene *v, const struct gather_o
 	g->o = *o;
 	if (!view_gather_table_init(&g->table, v, v->s, o->threads, e) &&
 	    !interp_smooth_groups_new(m, COS_CREASE, &g->groups, e) &&
-	    !geo_half_edges_build(&g->edges, m->element.corner, m->element.n, m->vertices, e) && !new_arrays(g, e))
+	    !geo_half_edges_build(&g->edges, m->element.corner, m->element.n, m->vertices, e) &&
+	    !new_arrays(g, e))
 		return g;
 	view_gather_free(g);
 	return NULL;
@@ -153,7 +156,9 @@ static void centroid(const struct model *m, uint32_t element, double x[3])
 {
 	memset(x, 0, 3 * sizeof *x);
 	for (int k = 0; k < 3; k++)
-		v3_mad(x, 1. / 3, &m->vertex[3 * (size_t)m->element.corner[3 * (size_t)element + (size_t)k]], x);
+		v3_mad(x, 1. / 3,
+		       &m->vertex[3 * (size_t)m->element.corner[3 * (size_t)element + (size_t)k]],
+		       x);
 }
 
 /* How far towards the middle it goes: where elements bend, no further than needed. */
@@ -183,14 +188,15 @@ static void add_corner(const struct gather *g, uint32_t corner, int side, double
 		for (size_t k = 0; k < 3; k++)
 			mean[k] = (2 * (3 * e + k) + (size_t)side) * bands + b;
 		p->h[b] += a * (double)all[at];
-		p->shift[b] += a * step *
-		               (double)(indirect[at] -
-		                        (indirect[mean[0]] + indirect[mean[1]] + indirect[mean[2]]) / 3);
+		p->shift[b] +=
+		    a * step *
+		    (double)(indirect[at] -
+		             (indirect[mean[0]] + indirect[mean[1]] + indirect[mean[2]]) / 3);
 	}
 }
 
-static void find_point(const struct gather *g, const uint32_t *corner, const uint32_t *of, uint32_t n,
-                       uint32_t cluster, int side, struct corner_point *p)
+static void find_point(const struct gather *g, const uint32_t *corner, const uint32_t *of,
+                       uint32_t n, uint32_t cluster, int side, struct corner_point *p)
 {
 	const struct model *m = g->v->m;
 	const double *vertex = &m->vertex[3 * (size_t)m->element.corner[corner[0]]];
@@ -254,7 +260,8 @@ static void part_corners(const struct gather *g, const uint32_t *corner, uint32_
 		of[i] = i;
 	for (uint32_t i = 0; i < n; i++)
 		for (uint32_t j = i + 1; j < n; j++) {
-			if (geo_sets_find(of, i) == geo_sets_find(of, j) || !neighbours(g->v->m, corner[i], corner[j]))
+			if (geo_sets_find(of, i) == geo_sets_find(of, j) ||
+			    !neighbours(g->v->m, corner[i], corner[j]))
 				continue;
 			near_corner(g, corner[i], side, a);
 			near_corner(g, corner[j], side, b);
@@ -265,11 +272,25 @@ static void part_corners(const struct gather *g, const uint32_t *corner, uint32_
 		of[i] = geo_sets_find(of, i);
 }
 
+/* Stores what was found at the point of a corner. */
+static void store_corner(struct gather *g, uint32_t corner, int side, const struct corner_point *p,
+                         const struct gathered *found)
+{
+	size_t bands = (size_t)g->v->m->bands, at = (2 * (size_t)corner + (size_t)side) * bands;
+
+	for (size_t b = 0; b < bands; b++, at++) {
+		g->value[at] = (float)fmax(0, found->h[b] + p->shift[b]);
+		g->error[at] = (float)found->error[b];
+		/* How light falls off at an edge is taken from the solution, which is too coarse
+		 * to know: what is added is as uncertain as it is large. */
+		g->common[at] = (float)hypot(found->common[b], p->shift[b]);
+	}
+}
+
 static void gather_group(struct gather *g, struct gather_worker *w, size_t group, int side)
 {
 	const uint32_t *corner = &g->groups.corner[g->groups.start[group]];
 	uint32_t n = g->groups.start[group + 1] - g->groups.start[group], of[VALENCE];
-	size_t bands = (size_t)g->v->m->bands;
 	struct gathered found;
 
 	for (uint32_t from = 0; from < n; from += VALENCE) {
@@ -280,17 +301,12 @@ static void gather_group(struct gather *g, struct gather_worker *w, size_t group
 			if (of[c] != c)
 				continue;
 			find_point(g, corner + from, of, some, c, side, &p);
-			view_gather_point(w, p.x, p.n, rng_mix(2 * corner[from + c] + (uint32_t)side), g->o.rays,
+			view_gather_point(w, p.x, p.n,
+			                  rng_mix(2 * corner[from + c] + (uint32_t)side), g->o.rays,
 			                  g->o.relative, p.h, &found);
 			for (uint32_t i = c; i < some; i++)
-				for (size_t b = 0; b < bands && of[i] == c; b++) {
-					size_t at = (2 * (size_t)corner[from + i] + (size_t)side) * bands + b;
-					g->value[at] = (float)fmax(0, found.h[b] + p.shift[b]);
-					g->error[at] = (float)found.error[b];
-					/* How light falls off at an edge is taken from the solution, which is too
-					 * coarse to know: what is added is as uncertain as it is large. */
-					g->common[at] = (float)hypot(found.common[b], p.shift[b]);
-				}
+				if (of[i] == c)
+					store_corner(g, corner[from + i], side, &p, &found);
 		}
 	}
 }
@@ -314,9 +330,12 @@ static double difference(const struct gather *g, uint32_t h, uint32_t other, siz
 	const struct model *m = g->v->m;
 	size_t row = 2 * (size_t)m->bands;
 	uint32_t a = h, b = h % 3 == 2 ? h - 2 : h + 1, c = h % 3 == 0 ? h + 2 : h - 1;
-	uint32_t oa = other % 3 == 2 ? other - 2 : other + 1, od = other % 3 == 0 ? other + 2 : other - 1;
-	const double *x[4] = { &m->vertex[3 * (size_t)m->element.corner[a]], &m->vertex[3 * (size_t)m->element.corner[b]],
-		&m->vertex[3 * (size_t)m->element.corner[c]], &m->vertex[3 * (size_t)m->element.corner[od]] };
+	uint32_t oa = other % 3 == 2 ? other - 2 : other + 1;
+	uint32_t od = other % 3 == 0 ? other + 2 : other - 1;
+	const double *x[4] = { &m->vertex[3 * (size_t)m->element.corner[a]],
+		               &m->vertex[3 * (size_t)m->element.corner[b]],
+		               &m->vertex[3 * (size_t)m->element.corner[c]],
+		               &m->vertex[3 * (size_t)m->element.corner[od]] };
 	double va = (double)g->value[a * row + channel], vb = (double)g->value[b * row + channel];
 	double w[3], whole[3], part[3], noise = 0;
 
@@ -349,7 +368,8 @@ static void find_misses(void *arg, size_t begin, size_t end, int thread)
 			if (g->edges.start[edge + 1] - g->edges.start[edge] != 2)
 				continue;
 			uint32_t other = use[0] == h ? use[1] : use[0];
-			if (g->groups.group[h] != g->groups.group[other % 3 == 2 ? other - 2 : other + 1] ||
+			if (g->groups.group[h] !=
+			        g->groups.group[other % 3 == 2 ? other - 2 : other + 1] ||
 			    !g->asked[2 * (other / 3) + (es & 1)])
 				continue;
 			for (size_t b = 0; b < bands; b++) {
@@ -379,7 +399,8 @@ void view_gather_at(struct gather *g, uint32_t element_side, const double x[3], 
 	*to = (struct gathered){ 0 };
 	interp_reconstruction_at(&g->v->all, element, (int)side, w, all);
 	for (size_t b = 0; b < bands; b++) {
-		double miss = (double)g->miss[element_side * bands + b], square = miss * miss, common = 0;
+		double miss = (double)g->miss[element_side * bands + b];
+		double square = miss * miss, common = 0;
 		for (size_t k = 0; k < 3; k++) {
 			size_t at = (2 * (3 * element + k) + side) * bands + b;
 			double off = w[k] * (double)g->error[at];

@@ -12,13 +12,13 @@
 
 /* Counts of rays, powers of two, which Sobol points fill evenly. Guesses but for AT_ONCE. */
 enum {
-	FIRST = 64, MOST = 1 << 14, /* of a part where an error is aimed at: the least that tells one,
-	                               and what takes a point 20 ms at 3 million rays a second */
-	CELLS = 8,                  /* squared, that rays are sorted into by direction, and */
-	AT_ONCE = 512,              /* sorted at a time: eight for each cell, exactly, when they are
-	                               aligned, as many as a packet of rays has */
-	ERRORS = 8                  /* of so many one is asked for the error of the solution: an
-	                               eighth of its cost, and it need not be known well */
+	FIRST = 64, MOST = 1 << 14, /* of a part where an error is aimed at: a guess, and what takes
+	                               a point 20 ms at 3 million rays a second */
+	CELLS = 8,     /* squared, that rays are sorted into by direction, and */
+	AT_ONCE = 512, /* sorted at a time: eight for each cell, exactly, when they are aligned, as
+	                  many as a packet of rays has */
+	ERRORS = 8     /* of so many one is asked for the error of the solution: an eighth of its
+	                  cost, and it need not be known well */
 };
 
 /* Standard error of a stretch of the sequence over that of as many independent parts, no unit:
@@ -53,8 +53,8 @@ static void turns(const float *u, float *cosine, float *sine)
 {
 	for (int i = 0; i < RAY_BATCH; i++) {
 		float a = (u[i] - .5f) * (float)PI, q = a * a;
-		float s = a * (1 + q * (-1.f / 6 + q * (1.f / 120 + q * (-1.f / 5040 + q * (1.f / 362880 -
-		          q * (1.f / 39916800))))));
+		float s = a * (1 + q * (-1.f / 6 + q * (1.f / 120 + q * (-1.f / 5040 +
+		          q * (1.f / 362880 - q * (1.f / 39916800))))));
 		float c = 1 + q * (-.5f + q * (1.f / 24 + q * (-1.f / 720 + q * (1.f / 40320 +
 		          q * (-1.f / 3628800 + q * (1.f / 479001600))))));
 		/* u - 1/2 is half a turn off. */
@@ -107,15 +107,6 @@ static void aim(double frame[3][3], const float *u0, const float *u1, struct ray
 	}
 }
 
-static void hit_point(const struct model *m, uint32_t triangle, double p, double q, double x[3])
-{
-	const uint32_t *c = &m->triangle.corner[3 * (size_t)triangle];
-
-	for (size_t k = 0; k < 3; k++)
-		x[k] = (1 - p - q) * m->vertex[3 * (size_t)c[0] + k] +
-		       p * m->vertex[3 * (size_t)c[1] + k] + q * m->vertex[3 * (size_t)c[2] + k];
-}
-
 /* Has the direct light computed where ray i of a batch met something, at y. */
 static void put_close(struct gather_worker *w, const struct ray_batch *b, uint32_t i, size_t place,
                       const double y[3], double *sum)
@@ -137,7 +128,8 @@ static void add_close(struct gather_worker *w, const struct gather_close *p)
 	const struct view_scene *v = w->t->v;
 	size_t bands = (size_t)v->m->bands;
 	const struct view_side *s =
-		&v->side[2 * model_patch_material(v->m, v->m->element.patch[p->place / 2]) + p->place % 2];
+	    &v->side[2 * model_patch_material(v->m, v->m->element.patch[p->place / 2]) +
+	             p->place % 2];
 	const float *rest = w->t->rest + 3 * bands * p->place;
 	double h[BANDS_MAX], error[BANDS_MAX], usual[BANDS_MAX];
 
@@ -180,16 +172,17 @@ static void add_blur(struct gather_worker *w, const double d[3], uint32_t place,
 {
 	const struct view_scene *v = w->t->v;
 	const struct model *m = v->m;
-	size_t bands = (size_t)m->bands, e = place / 2;
-	const struct view_side *s = &v->side[2 * model_patch_material(m, m->element.patch[e]) + place % 2];
+	size_t bands = (size_t)m->bands, e = place / 2, far = place ^ 1;
+	const struct view_side *s =
+	    &v->side[2 * model_patch_material(m, m->element.patch[e]) + place % 2];
 	double square = v3_dot(d, d);
-	double part = fabs(v3_dot(d, w->normal) * v3_dot(d, &m->element.normal[3 * e])) * m->element.area[e] /
-	              (PI * square * square);
+	double part = fabs(v3_dot(d, w->normal) * v3_dot(d, &m->element.normal[3 * e])) *
+	              m->element.area[e] / (PI * square * square);
 
 	for (size_t k = 0; k < bands; k++)
 		w->blur[k] +=
-			s->here[k] * s->here[k] * view_blurred(v, place * bands + k, part, computed) +
-			s->across[k] * s->across[k] * view_blurred(v, (place ^ 1) * bands + k, part, computed);
+		    s->here[k] * s->here[k] * view_blurred(v, place * bands + k, part, computed) +
+		    s->across[k] * s->across[k] * view_blurred(v, far * bands + k, part, computed);
 }
 
 /* Follows ray i of a batch beyond what it met. */
@@ -201,9 +194,10 @@ static void go_on(struct gather_worker *w, const double x[3], const struct ray_b
 	double y[3], d[3];
 
 	if (close || i % ERRORS == 0) {
-		hit_point(t->v->m, b->triangle[i], (double)b->w[0][i], (double)b->w[1][i], y);
+		view_gather_hit(t, b, i, y);
 		v3_sub(y, x, d);
-		close = close && v3_dot(d, d) < near_sizes * near_sizes * t->v->m->element.area[place / 2];
+		close = close &&
+		        v3_dot(d, d) < near_sizes * near_sizes * t->v->m->element.area[place / 2];
 	}
 	if (i % ERRORS == 0)
 		add_blur(w, d, place, close);

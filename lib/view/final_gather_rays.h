@@ -24,8 +24,8 @@ struct gather_worker {
 	struct gather_close close[GATHER_CLOSES];
 	uint32_t closes;
 	double normal[3];           /* of the point in work */
-	double blur[BANDS_MAX];     /* variance of radiance by the errors that the solution states, */
-	double blurs;               /* summed over so many rays */
+	double blur[BANDS_MAX];     /* variance of radiance by the errors of the solution, summed */
+	double blurs;               /* over so many rays */
 	struct direct_worker *direct;
 	struct err e;
 	uint64_t rays;

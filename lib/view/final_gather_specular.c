@@ -54,8 +54,8 @@ static int choose(const struct view_side *s, int bands, int side, struct gather_
 
 /* A direction of a lobe in place of its axis; 0 if it is below the horizon. Weights as in
  * lobe_weight.c. */
-static int scatter(const struct view_lobe *lobe, enum lobe_kind kind, int bands, const double normal[3],
-                   double cos_o, struct gather_going *g, double dir[3])
+static int scatter(const struct view_lobe *lobe, enum lobe_kind kind, int bands,
+                   const double normal[3], double cos_o, struct gather_going *g, double dir[3])
 {
 	double axis[3] = { dir[0], dir[1], dir[2] };
 	double u[2] = { rng_uniform(&g->random), rng_uniform(&g->random) };
@@ -80,21 +80,18 @@ static int scatter(const struct view_lobe *lobe, enum lobe_kind kind, int bands,
 static void leave(const struct gather_table *t, const struct ray_batch *b, uint32_t i,
                   const double normal[3], float org[3])
 {
-	const struct model *m = t->v->m;
-	const uint32_t *c = &m->triangle.corner[3 * (size_t)b->triangle[i]];
 	struct ray_units units = ray_units(t->v->rays);
-	double p = (double)b->w[0][i], q = (double)b->w[1][i], x[3];
+	double x[3];
 
-	for (size_t k = 0; k < 3; k++)
-		x[k] = (1 - p - q) * m->vertex[3 * (size_t)c[0] + k] +
-		       p * m->vertex[3 * (size_t)c[1] + k] + q * m->vertex[3 * (size_t)c[2] + k];
+	view_gather_hit(t, b, i, x);
 	ray_leave(t->v->rays, normal, x);
 	for (int k = 0; k < 3; k++)
 		org[k] = (float)((x[k] - units.centre[k]) * units.per_unit);
 }
 
-void view_gather_go_on(struct gather_tails *s, const struct gather_table *t, const struct ray_batch *b,
-                       uint32_t i, size_t place, const struct gather_going *g)
+void view_gather_go_on(struct gather_tails *s, const struct gather_table *t,
+                       const struct ray_batch *b, uint32_t i, size_t place,
+                       const struct gather_going *g)
 {
 	const struct model *m = t->v->m;
 	const struct view_side *seen =
@@ -115,8 +112,8 @@ void view_gather_go_on(struct gather_tails *s, const struct gather_table *t, con
 	double cosine = v3_dot(dir, front);
 	if (way.lobe == &seen->reflected)
 		v3_mad(dir, -2 * cosine, front, dir);
-	if (!isinf(way.lobe->k) && !scatter(way.lobe, m->lobe, m->bands, normal, fmax(fabs(cosine), cosine_least),
-	                                    to, dir))
+	if (!isinf(way.lobe->k) && !scatter(way.lobe, m->lobe, m->bands, normal,
+	                                    fmax(fabs(cosine), cosine_least), to, dir))
 		return;
 	leave(t, b, i, normal, to->org);
 	for (int k = 0; k < 3; k++)
@@ -139,7 +136,8 @@ static uint32_t take(struct gather_tails *s)
 	return n;
 }
 
-void view_gather_follow(struct gather_tails *s, const struct gather_table *t, uint32_t left, double *sum)
+void view_gather_follow(struct gather_tails *s, const struct gather_table *t, uint32_t left,
+                        double *sum)
 {
 	uint32_t place[RAY_BATCH];
 

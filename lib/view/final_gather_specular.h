@@ -25,10 +25,12 @@ struct gather_tails {
 
 /* Has the ray go on from what ray i of a batch met, unless chance ends it. There has to be
  * room for one. */
-void view_gather_go_on(struct gather_tails *s, const struct gather_table *t, const struct ray_batch *b,
-                       uint32_t i, size_t place, const struct gather_going *g);
+void view_gather_go_on(struct gather_tails *s, const struct gather_table *t,
+                       const struct ray_batch *b, uint32_t i, size_t place,
+                       const struct gather_going *g);
 
 /* Follows the rays that wait down to `left` and adds the radiance they find. */
-void view_gather_follow(struct gather_tails *s, const struct gather_table *t, uint32_t left, double *sum);
+void view_gather_follow(struct gather_tails *s, const struct gather_table *t, uint32_t left,
+                        double *sum);
 
 #endif

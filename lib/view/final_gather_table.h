@@ -26,16 +26,20 @@ struct gather_table {
 enum { GATHER_TAIL = 1, GATHER_ROUGH = 2 };
 
 /* v must outlive it. 0, or -1 and e; to be freed in any case. O(elements). */
-int view_gather_table_init(struct gather_table *t, const struct view_scene *v, const struct solution *s,
-                           int threads, struct err *e);
+int view_gather_table_init(struct gather_table *t, const struct view_scene *v,
+                           const struct solution *s, int threads, struct err *e);
 void view_gather_table_free(struct gather_table *t);
 
 /* The element-sides that the first n rays of a batch met, those of misses apart. */
 void view_gather_places(const struct gather_table *t, const struct ray_batch *b, uint32_t n,
                         uint32_t place[RAY_BATCH]);
 
+/* The point (world) that ray i of a batch met, in its triangle. */
+void view_gather_hit(const struct gather_table *t, const struct ray_batch *b, uint32_t i,
+                     double x[3]);
+
 /* Adds weight[bands] times the radiance M / pi of what ray i of a batch met. */
-void view_gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_t i, uint32_t place,
-                     const double *weight, double *sum);
+void view_gather_add(const struct gather_table *t, const struct ray_batch *b, uint32_t i,
+                     uint32_t place, const double *weight, double *sum);
 
 #endif

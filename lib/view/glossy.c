@@ -86,7 +86,8 @@ static void follow_sample(struct run *r, uint32_t i, struct part *to)
 	struct view_branch *next = r->next;
 
 	next->index = r->first + i;
-	double u[2] = { rng_sobol(next->index, 0, next->seed), rng_sobol(next->index, 1, next->seed) };
+	double u[2] = { rng_sobol(next->index, 0, next->seed),
+		        rng_sobol(next->index, 1, next->seed) };
 	if (kind == LOBE_RECIPROCAL)
 		bsdf_lobe_sample_whole(l->k, l->axis, u, next->dir);
 	else
@@ -123,7 +124,8 @@ static void aim(struct view_walker *w, const struct view_branch *b, const struct
 }
 
 /* Mean and variance of n samples in `parts` parts, with emitters or without. */
-static void measure(const struct run *r, int parts, double n, int lit, double *mean, double *variance)
+static void measure(const struct run *r, int parts, double n, int lit, double *mean,
+                    double *variance)
 {
 	for (int b = 0; b < r->w->v->m->bands; b++) {
 		double sum[REPLICATES];
@@ -200,7 +202,8 @@ static void put_light(struct run *r, int parts, double n, const double *lit)
 static uint32_t follow_all(struct run *r, int *parts)
 {
 	const struct view_branch *b = r->b;
-	uint32_t n = r->w->o->lobe_samples == VIEW_LOBE_ENOUGH ? REPLICATES * MOST : fixed_number(r);
+	uint32_t n =
+	    r->w->o->lobe_samples == VIEW_LOBE_ENOUGH ? REPLICATES * MOST : fixed_number(r);
 
 	r->next->share = b->share / n;
 	*parts = REPLICATES;
@@ -270,7 +273,8 @@ void view_lobe_probe(struct view_walker *w, const struct view_branch *b,
 	for (int k = 0; k < w->v->m->bands; k++) {
 		double off[2], weight = b->weight[k] * coefficient[k];
 		for (int p = 0; p < 2; p++)
-			off[p] = one.rest[k] + one.lit[k] - (r.part[p].rest[k] + r.part[p].lit[k]) / PROBES;
+			off[p] = one.rest[k] + one.lit[k] -
+			         (r.part[p].rest[k] + r.part[p].lit[k]) / PROBES;
 		w->probed[k] += weight * weight;
 		w->off[k] += off[0] * off[1];
 	}

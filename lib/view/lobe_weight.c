@@ -26,7 +26,8 @@ double view_lobe_density(const struct view_lobe_seen *l, enum lobe_kind kind, co
 double view_lobe_weight_at(const double dir[3], const void *arg)
 {
 	const struct view_lobe_weight *w = arg;
-	double cos_i = v3_dot(w->l->normal, dir), power = bsdf_lobe_power(w->l->k, v3_dot(w->l->axis, dir));
+	double cos_i = v3_dot(w->l->normal, dir);
+	double power = bsdf_lobe_power(w->l->k, v3_dot(w->l->axis, dir));
 
 	if (!(cos_i > 0) || power == 0)
 		return 0;
@@ -40,9 +41,9 @@ struct direct_weight view_lobe_weight(const struct view_lobe_weight *w)
 	/* cos^k falls to exp(-1/2) over its width, and at its reach to what no picture shows,
 	 * exp(-18.4) = 1e-8. k = 0 reaches everywhere. */
 	static const double logarithm_at_reach = -18.4, k_least = 1e-9;
+	double cos_reach = exp(logarithm_at_reach / fmax(w->l->k, k_least));
 	struct direct_weight d = { .at = view_lobe_weight_at, .arg = w,
-	                           .width = 1 / sqrt(w->l->k + 1),
-	                           .reach = acos(exp(logarithm_at_reach / fmax(w->l->k, k_least))) };
+	                           .width = 1 / sqrt(w->l->k + 1), .reach = acos(cos_reach) };
 
 	memcpy(d.axis, w->l->axis, sizeof d.axis);
 	return d;

@@ -3,8 +3,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-int view_shade_tile_init(struct view_shade_tile *s, const struct view_scene *v, struct gather *gather,
-                         double relative, double lobe_relative, int thread, struct err *e)
+int view_shade_tile_init(struct view_shade_tile *s, const struct view_scene *v,
+                         struct gather *gather, double relative, double lobe_relative, int thread,
+                         struct err *e)
 {
 	*s = (struct view_shade_tile){ .v = v, .relative = relative, .lobe_relative = lobe_relative,
 	                           .gather = gather, .thread = thread };
@@ -31,7 +32,8 @@ static void put_order(struct view_shade_tile *s, struct array *order, const stru
 	mem_append(order, &key, 1, sizeof key, &s->e);
 }
 
-void view_shade_tile_put(struct view_shade_tile *s, const struct view_request *q, const double *weight)
+void view_shade_tile_put(struct view_shade_tile *s, const struct view_request *q,
+                         const double *weight)
 {
 	const struct view_side *side = &s->v->side[2 * q->material + (uint32_t)q->side];
 
@@ -74,7 +76,8 @@ static void shade(struct view_shade_tile *s, size_t request, int side, const str
 	double *square = to->square + q->slot * bands;
 	double h[BANDS_MAX], error[BANDS_MAX], other[BANDS_MAX];
 
-	interp_reconstruction_at(s->gather ? &s->v->all : &s->v->part, q->element, side, q->w, other);
+	interp_reconstruction_at(s->gather ? &s->v->all : &s->v->part, q->element, side, q->w,
+	                         other);
 	occ_direct_begin(s->direct, 2 * q->element + (uint32_t)side);
 	if (occ_direct_at(s->direct, q->x, q->seed, s->relative, other, h, error, &s->e))
 		return;
@@ -86,7 +89,8 @@ static void shade(struct view_shade_tile *s, size_t request, int side, const str
 	if (!s->gather)
 		return;
 	struct gathered found;
-	view_gather_at(s->gather, 2 * q->element + (uint32_t)side, q->x, q->w, q->seed, s->thread, &found);
+	view_gather_at(s->gather, 2 * q->element + (uint32_t)side, q->x, q->w, q->seed, s->thread,
+	               &found);
 	for (size_t b = 0; b < bands; b++) {
 		double off = weight[b] * part[b] * found.error[b];
 		light[b] += weight[b] * part[b] * found.h[b];
@@ -98,7 +102,8 @@ static void shade(struct view_shade_tile *s, size_t request, int side, const str
 /* Adds the light of emitters in a lobe. */
 static void shade_lobe(struct view_shade_tile *s, size_t request, const struct view_sums *to)
 {
-	const struct view_lobe_request *q = (const struct view_lobe_request *)s->lobe.data + request;
+	const struct view_lobe_request *q =
+	    (const struct view_lobe_request *)s->lobe.data + request;
 	struct view_lobe_weight lobe = { &q->l, s->v->m->lobe };
 	struct direct_weight weight = view_lobe_weight(&lobe);
 	size_t at = q->slot * (size_t)s->v->m->bands;

@@ -46,11 +46,13 @@ struct view_shade_tile {
 };
 
 /* 0, or -1 and e. To be freed in any case. */
-int view_shade_tile_init(struct view_shade_tile *s, const struct view_scene *v, struct gather *gather,
-                         double relative, double lobe_relative, int thread, struct err *e);
+int view_shade_tile_init(struct view_shade_tile *s, const struct view_scene *v,
+                         struct gather *gather, double relative, double lobe_relative, int thread,
+                         struct err *e);
 void view_shade_tile_free(struct view_shade_tile *s);
 
-void view_shade_tile_put(struct view_shade_tile *s, const struct view_request *q, const double *weight);
+void view_shade_tile_put(struct view_shade_tile *s, const struct view_request *q,
+                         const double *weight);
 void view_shade_tile_put_lobe(struct view_shade_tile *s, const struct view_lobe_request *q);
 
 /* Of samples, or sums over those of a pixel, [samples or pixels][bands]. */

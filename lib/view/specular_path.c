@@ -114,7 +114,8 @@ static void put_request(struct view_walker *w, const struct view_branch *b, stru
 static void add_error(struct view_walker *w, const struct view_branch *b, const struct point *p)
 {
 	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
-	size_t bands = (size_t)w->v->m->bands, at = (2 * (size_t)p->element + (size_t)p->side) * bands;
+	size_t bands = (size_t)w->v->m->bands;
+	size_t at = (2 * (size_t)p->element + (size_t)p->side) * bands;
 	size_t far = (2 * (size_t)p->element + (size_t)!p->side) * bands;
 
 	if (!b->lobes) {
@@ -127,9 +128,10 @@ static void add_error(struct view_walker *w, const struct view_branch *b, const 
 	double way = b->reach + p->way;
 	double part = b->density * w->v->m->element.area[p->element] * p->cosine / (way * way);
 	for (size_t i = 0; i < bands; i++)
-		w->blurred[i] += b->weight[i] * b->weight[i] *
-		                 (s->here[i] * s->here[i] * view_blurred(w->v, at + i, part, 0) +
-		                  s->across[i] * s->across[i] * view_blurred(w->v, far + i, part, 0));
+		w->blurred[i] +=
+		    b->weight[i] * b->weight[i] *
+		    (s->here[i] * s->here[i] * view_blurred(w->v, at + i, part, 0) +
+		     s->across[i] * s->across[i] * view_blurred(w->v, far + i, part, 0));
 }
 
 /* What counts of an emitter that a sample of a lobe has met: it may be found by aiming, too. */
@@ -143,8 +145,8 @@ static double aimed_share(const struct view_walker *w, const struct view_branch 
 	uint32_t emitter = s->of[2 * p->element + (uint32_t)p->side];
 	if (emitter == UINT32_MAX)
 		return 1;
-	double other = view_emitter_images_density(s, &w->aim, (size_t)b->turns * s->emitters.n + emitter,
-	                                           b->reach + p->way, p->cosine);
+	size_t image = (size_t)b->turns * s->emitters.n + emitter;
+	double other = view_emitter_images_density(s, &w->aim, image, b->reach + p->way, p->cosine);
 	return b->density / (b->density + other);
 }
 
@@ -213,7 +215,8 @@ static void branch_into(struct view_walker *w, const struct view_branch *b, cons
 		return;
 	}
 	for (int i = 0; i < w->v->m->bands; i++)
-		w->axial[i] += b->weight[i] * b->weight[i] * lobe->coefficient[i] * lobe->coefficient[i];
+		w->axial[i] +=
+		    b->weight[i] * b->weight[i] * lobe->coefficient[i] * lobe->coefficient[i];
 	if (w->probing)
 		view_lobe_probe(w, b, &l, lobe->coefficient, scale, next);
 	view_push(w, b, next, lobe->coefficient, scale);

@@ -15,10 +15,10 @@
 enum {
 	TILE = 16,  /* pixels squared that are shaded together: their points share what is between
 	               surfaces and emitters, and their sums stay in the cache */
-	ROUND = 4,  /* samples of a pixel that are followed before it is looked at again: as many as
-	               pictures have by default */
-	PROBE = 4   /* of so many pixels squared one has its lobes probed: a sixteenth of the cost of
-	               sampling them, 16 probes a tile */
+	ROUND = 4,  /* samples of a pixel that are followed before it is looked at again: as many
+	               as pictures have by default */
+	PROBE = 4   /* of so many pixels squared one has its lobes probed: a sixteenth of the cost
+	               of sampling them, 16 probes a tile */
 };
 
 enum { SUMS = 7 };  /* arrays of view_sums */
@@ -163,13 +163,20 @@ static void ask_tiles(void *arg, size_t begin, size_t end, int thread)
 	struct worker *k = &r->worker[thread];
 
 	for (size_t t = begin; t < end; t++) {
-		struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack, .shader = &k->shader,
-			                 .asking = 1 };
+		struct view_walker w = {
+			.v = r->v, .o = r->o, .stack = k->stack, .shader = &k->shader, .asking = 1
+		};
 		struct tile tile = tile_at(r, t);
 		for (int p = 0; p < tile.pixels; p++)
 			for (int s = 0; s < r->o->samples; s++)
-				follow_sample(r, &w, tile.x + p % tile.wide, tile.y + p / tile.wide, s);
+				follow_sample(r, &w, tile.x + p % tile.wide, tile.y + p / tile.wide,
+				              s);
 	}
+}
+
+static double shown(const struct view_sums *s, size_t at)
+{
+	return s->diffuse[at] + s->directional[at] + s->emission[at];
 }
 
 /* Adds the samples of a round to a pixel's sums. */
@@ -179,7 +186,7 @@ static void add_round(const struct view_sums *from, size_t pixel, int samples, s
 	for (size_t s = 0; s < (size_t)samples; s++)
 		for (size_t b = 0; b < bands; b++) {
 			size_t at = (pixel * ROUND + s) * bands + b, sum = pixel * bands + b;
-			double total = from->diffuse[at] + from->directional[at] + from->emission[at];
+			double total = shown(from, at);
 			to->diffuse[sum] += from->diffuse[at];
 			to->directional[sum] += from->directional[at];
 			to->emission[sum] += from->emission[at];
@@ -194,7 +201,7 @@ static void add_round(const struct view_sums *from, size_t pixel, int samples, s
  * samples among one another, which fall off faster than by n since they are stratified. */
 static double sampling_variance(const struct view_sums *sums, size_t at, double n)
 {
-	double mean = (sums->diffuse[at] + sums->directional[at] + sums->emission[at]) / n;
+	double mean = shown(sums, at) / n;
 	double spread = fmax(0, sums->spread[at] / n - mean * mean);
 
 	return sums->square[at] / (n * n) + (n > 1 ? stratified * spread / ((n - 1) * sqrt(n)) : 0);
@@ -206,11 +213,24 @@ static int done(const struct render *r, const struct view_sums *sums, size_t pix
 	size_t bands = (size_t)r->v->m->bands;
 
 	for (size_t at = pixel * bands; at < (pixel + 1) * bands && r->o->relative > 0; at++) {
-		double mean = (sums->diffuse[at] + sums->directional[at] + sums->emission[at]) / n;
+		double mean = shown(sums, at) / n;
 		if (sampling_variance(sums, at, n) > r->o->relative * r->o->relative * mean * mean)
 			return 0;
 	}
 	return r->o->relative > 0;
+}
+
+/* Squared standard error of the mean of n samples in band k: of interpolated light, of sampling,
+ * and of lobes seen by one ray. */
+static double pixel_variance(const struct view_walker *w, const struct view_sums *sums, size_t at,
+                             size_t k, double n)
+{
+	double linear = sums->error[at] / n;
+	double variance = linear * linear + sampling_variance(sums, at, n);
+
+	if (w->probed[k] > 0)
+		variance += sums->axial[at] / n * fmax(0, w->off[k] / w->probed[k]);
+	return variance;
 }
 
 /* Stores a pixel of the sums over n samples as pixel (i, j) and adds it to the tile's. w: what
@@ -226,10 +246,7 @@ static void store_pixel(const struct render *r, const struct view_walker *w,
 	double total[BANDS_MAX], error[BANDS_MAX], all = 0, square = 0, emitted = 0;
 
 	for (size_t k = 0; k < bands; k++) {
-		double linear = from->error[pixel * bands + k] / n;
-		double variance = linear * linear + sampling_variance(from, pixel * bands + k, n);
-		if (w->probed[k] > 0)
-			variance += from->axial[pixel * bands + k] / n * fmax(0, w->off[k] / w->probed[k]);
+		double variance = pixel_variance(w, from, pixel * bands + k, k, n);
 		diffuse[k] /= n;
 		directional[k] /= n;
 		emission[k] /= n;
@@ -338,9 +355,9 @@ static int new_worker(const struct render *r, struct worker *k, int thread, stru
 	if (!shades(r))
 		return 0;
 	double relative = r->o->relative * part_of_error, usual = sqrt(r->o->samples);
-	return view_shade_tile_init(&k->shader, r->v, r->gather,
-	                            relative > 0 ? relative : fmin(1, usual_error * usual),
-	                            relative > 0 ? relative : fmin(1, usual_lobe_error * usual), thread, e);
+	double direct = relative > 0 ? relative : fmin(1, usual_error * usual);
+	double lobes = relative > 0 ? relative : fmin(1, usual_lobe_error * usual);
+	return view_shade_tile_init(&k->shader, r->v, r->gather, direct, lobes, thread, e);
 }
 
 static void free_workers(struct render *r)
@@ -391,7 +408,8 @@ static int new_buffers(struct render *r, size_t tiles, struct err *e)
 	/* Hammersley points, the same in every pixel: edges come out regular. Where sampling
 	 * may stop early, points of which any number is spread evenly. */
 	for (int i = 0; i < n; i++) {
-		r->spot[i][0] = r->o->relative > 0 && n > 1 ? rng_sobol((uint32_t)i, 1, 1) : (i + .5) / n;
+		r->spot[i][0] =
+		    r->o->relative > 0 && n > 1 ? rng_sobol((uint32_t)i, 1, 1) : (i + .5) / n;
 		r->spot[i][1] = r->o->relative > 0 && n > 1 ? rng_sobol((uint32_t)i, 0, 1)
 		                                   : radical_inverse((uint32_t)i) + .5 / n;
 	}

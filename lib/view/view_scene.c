@@ -22,7 +22,8 @@ static void make_lobe(struct view_lobe *lobe, const double *coefficient, int ban
 static void tabulate_side(const struct materials *mt, size_t material, int side,
                           struct view_side *s)
 {
-	size_t here = model_material_at(mt, material, side), across = model_material_at(mt, material, !side);
+	size_t here = model_material_at(mt, material, side);
+	size_t across = model_material_at(mt, material, !side);
 
 	s->black = side == BACK && mt->one_sided[material];
 	for (int b = 0; b < mt->bands; b++) {
@@ -32,7 +33,8 @@ static void tabulate_side(const struct materials *mt, size_t material, int side,
 		s->translucent |= s->across[b] > 0;
 		s->emits |= mt->emission[here + (size_t)b] > 0;
 	}
-	make_lobe(&s->reflected, &mt->rho_s[here], mt->bands, mt->alpha[2 * material + (size_t)side]);
+	make_lobe(&s->reflected, &mt->rho_s[here], mt->bands,
+	          mt->alpha[2 * material + (size_t)side]);
 	make_lobe(&s->transmitted, &mt->tau_s[across], mt->bands,
 	          mt->beta[2 * material + (size_t)!side]);
 }
@@ -71,10 +73,13 @@ static void find_ceiling(struct view_scene *v)
 	for (size_t c = 0; c < 3 * m->element.n; c++) {
 		size_t material = model_patch_material(m, m->element.patch[c / 3]);
 		for (int side = 0; side < 2; side++)
-			for (int b = 0; b < m->bands && !v->side[2 * material + (size_t)side].black; b++)
+			for (int b = 0; b < m->bands; b++) {
+				const float *h = v->all.corner + 2 * bands * c;
+				if (v->side[2 * material + (size_t)side].black)
+					break;
 				v->ceiling[b] = fmax(v->ceiling[b],
-				                     corner_ceiling(v, material, side,
-				                                    v->all.corner + 2 * bands * c, b));
+				                     corner_ceiling(v, material, side, h, b));
+			}
 	}
 }
 
@@ -112,14 +117,17 @@ static const double variance_at_edge = 4;
 /* What is left of an error without that of a part. */
 static double without(const double *all, const double *part, size_t at)
 {
-	return all ? all[at] * all[at] - (part ? fmin(part[at], all[at]) * fmin(part[at], all[at]) : 0) : 0;
+	double taken = all && part ? fmin(part[at], all[at]) : 0;
+
+	return all ? all[at] * all[at] - taken * taken : 0;
 }
 
 double view_blurred(const struct view_scene *v, size_t at, double part, int computed)
 {
 	const struct solution *s = v->s;
 	double noise = without(s->error.sampling, computed ? s->error.sampling_direct : NULL, at);
-	double missed = without(s->error.discretisation, computed ? s->error.discretisation_direct : NULL, at);
+	double missed =
+	    without(s->error.discretisation, computed ? s->error.discretisation_direct : NULL, at);
 
 	/* What is so near stands at an edge. */
 	return fmin(variance_at_edge * noise_left * noise_left, part) * noise +
@@ -127,13 +135,17 @@ double view_blurred(const struct view_scene *v, size_t at, double part, int comp
 }
 
 /* Group 0 of a solution with the parts that are interpolated alone, in arrays of its own. */
-static int part_solution(const struct solution *s, unsigned parts, struct solution *out, struct err *e)
+static int part_solution(const struct solution *s, unsigned parts, struct solution *out,
+                         struct err *e)
 {
 	size_t n = s->element_sides * (size_t)s->bands;
-	double **to[] = { &out->irradiance.direct, &out->irradiance.caustic, &out->irradiance.indirect };
-	const double *from[] = { s->irradiance.direct, s->irradiance.caustic, s->irradiance.indirect };
+	double **to[] = { &out->irradiance.direct, &out->irradiance.caustic,
+		          &out->irradiance.indirect };
+	const double *from[] = { s->irradiance.direct, s->irradiance.caustic,
+		                 s->irradiance.indirect };
 
-	*out = (struct solution){ .groups = 1, .element_sides = s->element_sides, .bands = s->bands };
+	*out =
+	    (struct solution){ .groups = 1, .element_sides = s->element_sides, .bands = s->bands };
 	for (int p = 0; p < 3; p++) {
 		if (!(*to[p] = mem_new(n, sizeof **to[p], "errors", e)))
 			return -1;
@@ -144,7 +156,8 @@ static int part_solution(const struct solution *s, unsigned parts, struct soluti
 	out->error.sampling = mem_new(n, sizeof *out->error.sampling, "errors", e);
 	out->error.sampling_direct = mem_new(n, sizeof *out->error.sampling_direct, "errors", e);
 	out->error.discretisation = mem_new(n, sizeof *out->error.discretisation, "errors", e);
-	out->error.discretisation_direct = mem_new(n, sizeof *out->error.discretisation, "errors", e);
+	out->error.discretisation_direct =
+	    mem_new(n, sizeof *out->error.discretisation, "errors", e);
 	return out->error.sampling && out->error.sampling_direct && out->error.discretisation &&
 	       out->error.discretisation_direct ? 0 : -1;
 }
@@ -160,7 +173,9 @@ static int part_errors(const struct view_scene *v, const struct solution *s, int
 	if (part_solution(s, parts, some, e))
 		return -1;
 	for (size_t i = 0; i < n && s->error.sampling; i++) {
-		double h = some->irradiance.direct[i] + some->irradiance.caustic[i] + some->irradiance.indirect[i], all = h;
+		double h = some->irradiance.direct[i] + some->irradiance.caustic[i] +
+		           some->irradiance.indirect[i];
+		double all = h;
 		for (size_t g = 0; g < s->groups && parts == PART_CAUSTIC; g++)
 			all += s->irradiance.direct[g * n + i] + s->irradiance.indirect[g * n + i];
 		some->error.sampling[i] = all > 0 ? s->error.sampling[i] * h / all : 0;
