@@ -223,7 +223,9 @@ static int resume(struct job *j, struct err *e)
 static void log_step(void *arg, const struct radiosity_step *step)
 {
 	struct job *j = arg;
-	double unshot = 0, emitted = 0, all = -log(fmax(j->r->solve.stop, 1e-15));
+	double unshot = 0, emitted = 0;
+	/* Less than rounding is never left, for --stop 0 either. */
+	const double all = -log(fmax(j->r->solve.stop, 1e-15));
 
 	for (int k = 0; k < step->bands; k++) {
 		unshot += step->unshot[k];
