@@ -18,7 +18,7 @@
 #include "tools/common/cli.h"
 #include "tools/common/print_ff.h"
 
-enum { SHOWN = 60 };
+enum { SHOWN = 60 }; /* bytes of a text that the overview shows: a line */
 
 #define PATCH_MATRIX "patch-matrix"
 

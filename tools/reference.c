@@ -15,6 +15,7 @@
 #include "tools/common/cli.h"
 #include "tools/common/key.h"
 
+/* Paths a pixel and particles where --samples is not given: seconds for a small scene. Guesses. */
 enum { PICTURE_SAMPLES = 64, PARTICLES = 1000000 };
 
 struct reference {

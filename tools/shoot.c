@@ -55,7 +55,7 @@ struct job {
 	FILE *log;
 	struct progress progress;   /* by the logarithm of what is unshot */
 	double begun;
-	double prepare_seconds, solve_seconds, gather_seconds, estimate_seconds;
+	double prepare_seconds, solve_seconds, element_seconds, estimate_seconds;
 };
 
 static void settle(struct cli *c, int operand, struct request *r)
@@ -223,7 +223,9 @@ static int resume(struct job *j, struct err *e)
 static void log_step(void *arg, const struct radiosity_step *step)
 {
 	struct job *j = arg;
-	double unshot = 0, emitted = 0, all = -log(fmax(j->r->solve.stop, 1e-15));
+	double unshot = 0, emitted = 0;
+	/* Less than rounding is never left, for --stop 0 either. */
+	const double all = -log(fmax(j->r->solve.stop, 1e-15));
 
 	for (int k = 0; k < step->bands; k++) {
 		unshot += step->unshot[k];
@@ -267,7 +269,7 @@ static int solve(struct job *j, struct err *e)
 		return -1;
 	j->prepare_seconds = t1 - t0;
 	j->solve_seconds = t2 - t1;
-	j->gather_seconds = t3 - t2;
+	j->element_seconds = t3 - t2;
 	j->estimate_seconds = cli_seconds() - t3;
 	return 0;
 }
@@ -357,9 +359,9 @@ static void print_report(const struct job *j)
 		fprintf(out, "directions    %.3g of what is emitted used the nearest known direction\n",
 		       r->guessed);
 	fprintf(out, "seconds       %.3f join, %.3f shoot, %.3f elements (%.2f GB/s of form factors), "
-	        "%.3f estimate\n", j->prepare_seconds, j->solve_seconds, j->gather_seconds,
-	       (r->solve_bytes + r->gather_bytes) /
-	       (j->solve_seconds + j->gather_seconds) * 1e-9, j->estimate_seconds);
+	        "%.3f estimate\n", j->prepare_seconds, j->solve_seconds, j->element_seconds,
+	       (r->solve_bytes + r->element_bytes) /
+	       (j->solve_seconds + j->element_seconds) * 1e-9, j->estimate_seconds);
 	fprintf(out, "peak memory   %.0f MB\n", cli_peak_megabytes());
 }
 

@@ -2,7 +2,8 @@
 
 #include <math.h>
 
-/* Sums of a block are added to sums of blocks: rounding grows with neither. */
+/* Sums of a block are added to sums of blocks: rounding grows with neither.
+ * About the root of how many values there are; any such number does. */
 enum { BLOCK = 4096 };
 
 static double number(const struct container_view *v, uint64_t i)

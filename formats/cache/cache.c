@@ -9,7 +9,7 @@
 #include "formats/container/digest.h"
 #include "lib/base/mem.h"
 
-enum { ID_DIGITS = 32 };
+enum { ID_DIGITS = 32 }; /* hexadecimal, of XXH3-128 */
 
 void file_cache_info_free(struct cache_info *i)
 {

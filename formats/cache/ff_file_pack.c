@@ -6,7 +6,8 @@
 
 #include "lib/base/index_check.h"
 
-/* Blocks of fewer words are not worth looking for. */
+/* Blocks of fewer words are not worth looking for: they take less than what tells them apart (a
+ * digest of 16 bytes, 8 of a place). A guess. */
 enum { WORTH_SHARING = 8 };
 
 void file_ff_packed_free(struct ff_packed *p)

@@ -6,6 +6,8 @@
 #include "lib/data/ff.h"
 #include "lib/data/model.h"
 
+/* Blocks back that equal columns are looked for: a patch's two sides and its neighbours see the
+ * same. A guess; the size of a .ff file shows what it does. */
 enum { FF_PACK_KNOWN = 64 };
 
 /* Columns of a block that later ones may have too. */

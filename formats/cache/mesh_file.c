@@ -10,7 +10,7 @@
 
 #define FORMAT "twopass.mesh"
 
-enum { FIELDS_MAX = 40 };
+enum { FIELDS_MAX = 40 }; /* room for the lists of fields below, in one file */
 
 static_assert(sizeof(struct split) == 3 * sizeof(int32_t), "splits are stored as they are");
 

@@ -8,7 +8,7 @@
 
 #define FORMAT "twopass.rad"
 
-enum { FIELDS_MAX = 16 };
+enum { FIELDS_MAX = 16 }; /* room for the list of fields below */
 
 /* What is a plain member of the struct and an array in the file. */
 struct plain {

@@ -13,6 +13,8 @@
 
 #include "lib/base/mem.h"
 
+/* Files in the making at one time that a signal tidies up; a program has a few (an array that
+ * grows large has one of its own, unlinked at once). */
 enum { TEMPORARIES = 16 };
 
 /* Names a signal handler may read: static, and in_use is set last. */

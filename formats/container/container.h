@@ -1,6 +1,6 @@
-/* The safetensors container of .mesh, .ff and .rad files (DESIGN: 8-byte
- * little-endian header length, JSON header, raw little-endian arrays without
- * gaps, widest type first). */
+/* The safetensors container of .mesh, .ff and .rad files: 8 bytes of the header's length
+ * (little-endian), the header in JSON, arrays as they are in memory (little-endian) without
+ * gaps, the widest type first, so that all are aligned. mesh(5) has the format. */
 #ifndef TWOPASS_CONTAINER_H
 #define TWOPASS_CONTAINER_H
 
@@ -14,7 +14,7 @@ enum dtype { DT_F64, DT_U64, DT_I64, DT_F32, DT_U32, DT_I32, DT_U16, DT_U8, DT_C
 size_t file_dtype_size(enum dtype t);
 const char *file_dtype_name(enum dtype t); /* safetensors: "F64", "U64", … "U8" */
 
-enum { CONTAINER_DIMS = 4 };
+enum { CONTAINER_DIMS = 4 }; /* of an array at most; ours have up to 3 */
 
 /* ---- writing: streaming and atomic ---- */
 

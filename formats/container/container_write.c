@@ -12,6 +12,8 @@
 #include "formats/container/digest.h"
 #include "lib/base/mem.h"
 
+/* Bytes of an array that are kept in memory before it goes to a file of its own: 1 MiB makes
+ * writes long, a guess. */
 enum { BUFFER = 1 << 20 };
 
 struct tensor {

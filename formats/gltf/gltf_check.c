@@ -9,7 +9,7 @@
 #include "lib/data/camera_pose.h"
 
 /* Accessors of zeros (without a bufferView) cost nothing in the file, so that a
- * small file could ask for any amount of memory. */
+ * small file could ask for any amount of memory. Elements at most: 256 MiB of VEC4, a guess. */
 enum { ZEROS_MAX = 1 << 24 };
 
 static int check_camera(const char *path, size_t i, const json_t *camera, struct err *e)

@@ -4,9 +4,8 @@
 #include <string.h>
 
 #include "formats/gltf/gltf_doc.h"
+#include "lib/base/constants.h"
 #include "lib/base/vec3.h"
-
-static const double half_pi = 1.57079632679489661923;
 
 enum { RGB = 3 };
 
@@ -46,8 +45,8 @@ static int set_cones(const struct gltf_reader *g, const json_t *light, int index
 {
 	const json_t *spot = json_object_get(light, "spot");
 
-	cone[0] = fmin(half_pi, gltf_number(spot, "innerConeAngle", 0));
-	cone[1] = fmin(half_pi, gltf_number(spot, "outerConeAngle", half_pi / 2));
+	cone[0] = fmin(PI / 2, gltf_number(spot, "innerConeAngle", 0));
+	cone[1] = fmin(PI / 2, gltf_number(spot, "outerConeAngle", PI / 4));
 	if (!(cone[1] > 0) || cone[0] > cone[1])
 		return err_set(e, "%s: extensions." GLTF_LIGHTS ".lights[%d].spot: outerConeAngle "
 		               "%.15g is %s; correct the file", g->source.path, index, cone[1],

@@ -8,8 +8,13 @@
 #include "lib/base/vec3.h"
 
 /* Columns of a matrix count as dependent when the volume that they span as unit
- * vectors is below this. */
+ * vectors is below this: far above the rounding of a product of matrices in float64, far below
+ * any scale that is meant. A guess. */
 static const double SINGULAR = 1e-12;
+
+/* What a quaternion's squared length may be off 1: exporters round to few digits, and each is
+ * normalised before use. A guess. */
+static const double unit_tolerance = .02;
 
 static int set_parents(struct gltf_reader *g, struct err *e)
 {
@@ -122,7 +127,7 @@ static int check_matrix(const struct gltf_reader *g, size_t i, struct err *e)
 	                      n->matrix[15] != 1))
 		return err_set(e, "%s: nodes[%zu].matrix: is not affine, its last row must be "
 		               "0 0 0 1; correct the file", g->source.path, i);
-	if (!(fabs(length - 1) < .02))
+	if (!(fabs(length - 1) < unit_tolerance))
 		return err_set(e, "%s: nodes[%zu].rotation: is no unit quaternion; correct the "
 		               "file", g->source.path, i);
 	local_matrix(n, m);

@@ -7,7 +7,7 @@
 #include "formats/gltf/gltf_doc.h"
 #include "lib/base/mem.h"
 
-enum { NOTE = 512 };
+enum { NOTE = 512 }; /* bytes of a note; a longer one is cut */
 
 int gltf_note(struct gltf_report *r, struct err *e, const char *format, ...)
 {

@@ -36,7 +36,7 @@ struct rule {
 
 #define MAX_INTEGER 9007199254740992. /* 2^53, the spec's limit */
 #define MAX_INT32 2147483647.
-#define HALF_PI 1.5707965 /* rounded up: files have float32 numbers */
+#define RIGHT_ANGLE 1.5707965 /* rounded up: files have float32 numbers */
 
 #define INTEGER(in, key, needed, min, max) { in, key, T_INTEGER, needed, NULL, min, max, 0, ROOT }
 #define NUMBER(in, key, needed, min, max) { in, key, T_NUMBER, needed, NULL, min, max, 0, ROOT }
@@ -172,13 +172,16 @@ static const struct rule table[] = {
 	NUMBER(LIGHT, "intensity", 0, 0, INFINITY),
 	NUMBER(LIGHT, "range", 0, 0, INFINITY),
 	OBJECT(LIGHT, "spot", 0, SPOT),
-	NUMBER(SPOT, "innerConeAngle", 0, 0, HALF_PI),
-	NUMBER(SPOT, "outerConeAngle", 0, 0, HALF_PI),
+	NUMBER(SPOT, "innerConeAngle", 0, 0, RIGHT_ANGLE),
+	NUMBER(SPOT, "outerConeAngle", 0, 0, RIGHT_ANGLE),
 	OBJECT(NODE_EXTENSIONS, GLTF_LIGHTS, 0, LIGHT_OF_NODE),
 	INDEX(LIGHT_OF_NODE, "light", 1, "lights"),
 };
 
-enum { RULES = sizeof table / sizeof *table, PLACE = 256 };
+enum { RULES = sizeof table / sizeof *table };
+
+/* Bytes of a place's text in a message; a longer one is cut. */
+enum { PLACE = 256 };
 
 /* Where in the file: a chain up to the root, spelt out only for an error. */
 struct place {

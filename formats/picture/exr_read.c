@@ -10,7 +10,8 @@
 #include "formats/picture/exr_file.h"
 #include "lib/base/mem.h"
 
-/* Beyond this a header is wrong or the picture is not ours to look at. */
+/* Pixels either way (as CAMERA_SIZE_MAX) and channels: beyond this a header is wrong or the
+ * picture is not ours to look at. Guesses. */
 enum { SIZE_LIMIT = 65536, CHANNEL_LIMIT = 4096 };
 
 struct input {
@@ -84,7 +85,7 @@ static int check(struct input *in, exr_result_t code)
 
 static int read_pipe(struct input *in)
 {
-	enum { STEP = 1 << 16 };
+	enum { STEP = 1 << 16 }; /* bytes, what a pipe holds */
 	ssize_t n;
 
 	do {

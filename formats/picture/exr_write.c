@@ -10,10 +10,11 @@
 #include "formats/picture/exr_file.h"
 #include "lib/base/mem.h"
 
-/* zlib levels above 4 cost much time for few bytes on pictures. */
+/* zlib's level, 1 to 9: above 4 they cost much time for few bytes on pictures. No figures were
+ * kept; `trace --compression zip` prints the seconds of writing. */
 enum { ZIP_LEVEL = 4 };
 
-static const float half_max = 65504.f;
+static const float half_max = 65504.f; /* the largest 16-bit float */
 
 struct output {
 	exr_context_t context;
@@ -171,7 +172,7 @@ static int hardly_smaller(const exr_encode_pipeline_t *p)
 	return p->compressed_bytes > p->packed_bytes - p->packed_bytes / 8;
 }
 
-enum { SKIPPED = 7 }; /* chunks left as they are after one that was hardly smaller */
+enum { SKIPPED = 7 }; /* chunks left as they are after one that was hardly smaller; a guess */
 
 /* The encoder of chunks, and how it compresses. */
 struct encoder {

@@ -16,6 +16,21 @@ static void add(struct verify *v, const char *name, const char *unit, double val
 
 /* ---- form factors ---- */
 
+/* Of a flow A F: what float32 values of the file (6e-8 each) and row scales leave at most; a
+ * guess. */
+static const double float_rounding = 1e-6;
+
+/* How often a law may seem to be broken by chance, over all pairs of a file. */
+static const double chance = .01;
+
+/* What rows may miss 1 by after scaling, which is to 1e-12, and elements the ledger, over what
+ * is emitted: float32 values summed in another order. Guesses with room for large scenes. */
+static const double closure_limit = 1e-9, elements_limit = 1e-9;
+
+/* What the ledger may miss, over what is emitted: rounding in float64 alone, which `shoot` prints
+ * as residual. A guess with room for it. */
+static const double ledger_limit = 1e-13;
+
 /* Diffuse form factors between patch-sides, one sparse row for each side. */
 struct pairs {
 	struct patch_matrix pm;
@@ -106,20 +121,22 @@ static double area(const struct pairs *p, size_t i)
  * what float32 values leave. */
 static double variance(const struct pairs *p, size_t i, double flow)
 {
-	double error = area(p, i) * (double)p->pm.f->row.error[p->pm.row[i]], rounding = 1e-6 * flow;
+	double error = area(p, i) * (double)p->pm.f->row.error[p->pm.row[i]];
+	double rounding = float_rounding * flow;
 
 	return error * error + rounding * rounding;
 }
 
 /* The number of standard errors that n normal values all stay within in 99 of 100
- * cases: n erfc(z / sqrt 2) = .01. */
+ * cases: n erfc(z / sqrt 2) = chance. By bisection: erfc(40 / sqrt 2) is below any 1 / n, and 60
+ * halvings leave all bits of a double. */
 static double family_z(double n)
 {
 	double low = 0, high = 40;
 
 	for (int i = 0; i < 60; i++) {
 		double z = (low + high) / 2;
-		if (n * erfc(z / sqrt(2.)) > .01)
+		if (n * erfc(z / sqrt(2.)) > chance)
 			low = z;
 		else
 			high = z;
@@ -196,12 +213,13 @@ int ff_verify(const struct ff *f, const struct ff_scene *s, struct verify *v, st
 	*v = (struct verify){ 0 };
 	if (!failed) {
 		compare_pairs(&p, &r);
-		add(v, "rows: closure after scaling", "", closure, 1e-9);
+		add(v, "rows: closure after scaling", "", closure, closure_limit);
 		add(v, "rows: residual before scaling", "", residual, (double)INFINITY);
 	}
 	if (!failed && r.pairs > 0) {
 		add(v, "reciprocity: worst pair", "standard errors", r.worst, family_z(r.pairs));
-		/* Near 1 for many pairs; a few scatter by chance, as do error estimates. */
+		/* Near 1 for many pairs; a few scatter by chance, as do error estimates: 2 is a guess
+		 * for these, 3 / sqrt(pairs) three standard deviations of a mean. */
 		add(v, "reciprocity: all pairs", "of the stated error",
 		    r.expected > 0 ? sqrt(r.squares / r.expected) : 0, 2 + 3 / sqrt(r.pairs));
 	}
@@ -283,7 +301,7 @@ void solution_verify(const struct model *m, const struct solution *s, struct ver
 		                        emitted);
 	}
 	add(v, "ledger: emitted - absorbed - escaped - lost - cut - unshot", "of what is emitted",
-	    residual, 1e-13);
-	add(v, "elements: absorbed flux against the ledger", "of what is emitted", missing, 1e-9);
+	    residual, ledger_limit);
+	add(v, "elements: absorbed flux against the ledger", "of what is emitted", missing, elements_limit);
 	add(v, "unshot", "of what is emitted", left, (double)INFINITY);
 }

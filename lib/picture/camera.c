@@ -4,7 +4,12 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "lib/base/constants.h"
 #include "lib/base/vec3.h"
+
+/* The sine of the angle between view and up direction below which the picture's upright is
+ * rounding. A guess. */
+static const double parallel = 1e-9;
 
 static int no_such_camera(const struct model *m, const char *name, struct err *e)
 {
@@ -112,19 +117,18 @@ int picture_camera_look_at(const double eye[3], const double target[3], const do
                            double fov_degrees, struct camera *c, struct err *e)
 {
 	double back[3], right[3], upright[3];
-	double degree = acos(-1) / 180;
 
 	v3_sub(eye, target, back);
 	if (!(v3_normalise(back) > 0))
 		return err_set(e, "the eye and the target of the view are the same point");
 	v3_cross(up, back, right);
-	if (!(v3_normalise(right) > 1e-9 * v3_length(up)))
+	if (!(v3_normalise(right) > parallel * v3_length(up)))
 		return err_set(e, "the view's up direction lies along its line of sight; "
 		               "give another one by --up");
 	if (!(fov_degrees > 0 && fov_degrees < 180))
 		return err_set(e, "the field of view must lie between 0 and 180 degrees");
 	v3_cross(back, right, upright);
-	*c = (struct camera){ .yfov = fov_degrees * degree };
+	*c = (struct camera){ .yfov = fov_degrees * (PI / 180) };
 	memcpy(c->to_world, right, sizeof right);
 	memcpy(c->to_world + 4, upright, sizeof upright);
 	memcpy(c->to_world + 8, back, sizeof back);

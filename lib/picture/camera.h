@@ -5,9 +5,12 @@
 #include "lib/base/err.h"
 #include "lib/data/model.h"
 
+/* Pixels: the width of a picture that is given none, and the most either way, so that their
+ * product is no more than 2^32. Conventions. */
 enum { CAMERA_WIDTH = 640, CAMERA_SIZE_MAX = 65536 };
 
-/* Vertical field of view, degrees, and upright direction of a view that gives none. */
+/* Vertical field of view, degrees, and upright direction of a view that gives none. The first
+ * is a convention, the second glTF's. */
 #define CAMERA_FOV 50.
 #define CAMERA_UP { 0, 1, 0 }
 

@@ -158,7 +158,8 @@ int picture_compare_difference(const struct image *a, const int *channel_a, cons
 		name[c] = a->name[channel_a[c]];
 	status = picture_image_new(out, a->width, a->height, n, name, e);
 	for (int c = 0; c < n && status == 0; c++) {
-		const float *x = picture_image_plane(a, channel_a[c]), *y = picture_image_plane(b, channel_b[c]);
+		const float *x = picture_image_plane(a, channel_a[c]);
+		const float *y = picture_image_plane(b, channel_b[c]);
 
 		for (size_t i = 0; i < pixels; i++)
 			picture_image_plane(out, c)[i] = x[i] - y[i];

@@ -5,7 +5,16 @@
 
 #include "lib/picture/tonemap.h"
 
+/* Dots of a glyph: the smallest that digits can be told apart in. Ticks at most, and rows of
+ * pixels at least: what is easily read, and two numbers with room between; guesses by eye, as are
+ * the distances in draw_legend. */
 enum { GLYPH_WIDTH = 5, GLYPH_HEIGHT = 7, TICKS_MAX = 16, ROWS_MIN = 40 };
+
+/* Rows of pixels for each that a dot is high: 1 up to that many. A guess by eye. */
+enum { ROWS_A_DOT = 500 };
+
+/* Of a value or a range: what powers of ten are off by rounding, and more. */
+static const double rounded = 1e-9;
 
 static const float white[3] = { 1, 1, 1 };
 
@@ -38,8 +47,8 @@ static void draw_text(struct canvas *c, int x, int y, int dot, const char *text)
 		for (size_t g = 0; g < sizeof glyphs / sizeof *glyphs; g++)
 			for (int i = 0; glyphs[g].c == *text && i < GLYPH_WIDTH * GLYPH_HEIGHT; i++)
 				if (glyphs[g].row[i / GLYPH_WIDTH] & 16 >> i % GLYPH_WIDTH)
-					fill(c, x + i % GLYPH_WIDTH * dot, y + i / GLYPH_WIDTH * dot, dot,
-					     dot, white);
+					fill(c, x + i % GLYPH_WIDTH * dot,
+					     y + i / GLYPH_WIDTH * dot, dot, dot, white);
 }
 
 /* Multiples of 1, 2 or 5 times a power of ten. Returns how many, at most `most`. */
@@ -47,7 +56,7 @@ static int linear_ticks(const struct tone_scale *s, int most, double *tick)
 {
 	static const double steps[] = { 1, 2, 5 };
 	int power = (int)floor(log10((s->max - s->min) / most));
-	double slack = 1e-9 * (s->max - s->min);
+	double slack = rounded * (s->max - s->min);
 
 	for (int i = 0; i < 30; i++) {
 		double step = steps[i % 3] * pow(10, power + i / 3);
@@ -80,7 +89,7 @@ static int logarithmic_ticks(const struct tone_scale *s, int most, double *tick)
 			for (int k = 0; k < sets[set].n; k++) {
 				double v = sets[set].step[k] * pow(10, d);
 
-				if (v < s->min * (1 - 1e-9) || v > s->max * (1 + 1e-9))
+				if (v < s->min * (1 - rounded) || v > s->max * (1 + rounded))
 					continue;
 				if (n < most)
 					tick[n] = v;
@@ -130,7 +139,7 @@ static void draw_legend(struct canvas *c, int x, int dot, const struct tone_scal
 int picture_legend_append(struct canvas *c, const struct tone_scale *s, struct err *e)
 {
 	int height = c->height < ROWS_MIN ? ROWS_MIN : c->height;
-	int dot = 1 + height / 500, characters = 0;
+	int dot = 1 + height / ROWS_A_DOT, characters = 0;
 	int most = (height - 12 * dot) / (2 * GLYPH_HEIGHT * dot);
 	double tick[TICKS_MAX];
 	int ticks = find_ticks(s, most > TICKS_MAX ? TICKS_MAX : most, tick);
@@ -141,7 +150,8 @@ int picture_legend_append(struct canvas *c, const struct tone_scale *s, struct e
 
 		characters = n > characters ? n : characters;
 	}
-	if (picture_canvas_new(&wide, c->width + (27 + characters * (GLYPH_WIDTH + 1)) * dot, height, e))
+	const int extra = (27 + characters * (GLYPH_WIDTH + 1)) * dot;
+	if (picture_canvas_new(&wide, c->width + extra, height, e))
 		return -1;
 	for (int y = 0; y < c->height; y++)
 		memcpy(wide.rgb + 3 * (size_t)y * (size_t)wide.width,

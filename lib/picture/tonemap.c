@@ -7,7 +7,20 @@
 #include "lib/base/constants.h"
 #include "lib/base/mem.h"
 
+/* Of white: what photographers expose for, the reflectance of a grey card. */
 static const double middle_grey = .18;
+
+/* Parts of the lit pixels, by luminance, between which their mean is exposed for: lamps and dark
+ * corners do not count. Guesses. */
+static const double exposed_from = .05, exposed_to = .95;
+
+/* Of a value: what powers of ten are off by rounding, and more. */
+static const double rounded = 1e-9;
+
+/* The part of the lit pixels that may lie below a logarithmic scale, and how far one reaches down
+ * from its end at most, and in a picture without light: guesses. */
+static const double below_scale = .01, scale_reach = 10000, dark_reach = 100;
+
 static const float magenta[3] = { 1, 0, 1 };
 
 /* ---- canvas ---- */
@@ -54,10 +67,12 @@ static double luminance(const int channel[3], const double rgb[3])
 {
 	if (channel[0] == channel[1] && channel[1] == channel[2])
 		return rgb[0];
+	/* ITU-R BT.709. */
 	return .2126 * rgb[0] + .7152 * rgb[1] + .0722 * rgb[2];
 }
 
-/* Histogram of log2 of positive luminances. */
+/* Histogram of log2 of positive luminances: all that floats have, 2^-149 to 2^128 times what
+ * the weights make of it, at 1 percent. */
 enum { BINS_PER_EV = 64, EV_MIN = -160, EV_MAX = 136, BINS = (EV_MAX - EV_MIN) * BINS_PER_EV };
 
 struct histogram {
@@ -113,8 +128,8 @@ double picture_tonemap_exposure(const struct image *im, const int channel[3], si
 	*lit = h ? h->n : 0;
 	for (int i = 0; *lit && i < BINS; i++) {
 		/* The part of this bin between the percentiles. */
-		double from = fmax(below, .05 * (double)*lit);
-		double to = fmin(below + (double)h->count[i], .95 * (double)*lit);
+		double from = fmax(below, exposed_from * (double)*lit);
+		double to = fmin(below + (double)h->count[i], exposed_to * (double)*lit);
 
 		if (to > from) {
 			sum += (to - from) * bin_ev(i);
@@ -203,9 +218,9 @@ static double round_number(double x, int up)
 		double v = steps[i] * power;
 
 		/* A tolerance, because powers of ten are rounded. */
-		if (up && v >= x * (1 - 1e-9))
+		if (up && v >= x * (1 - rounded))
 			return v;
-		if (!up && v <= x * (1 + 1e-9))
+		if (!up && v <= x * (1 + rounded))
 			below = v;
 	}
 	return up ? 10 * power : below;
@@ -226,8 +241,8 @@ int picture_tonemap_scale(const struct image *im, const int channel[3], struct t
 			s->max = h->least < 0 && !s->logarithmic ? 0 : 1;
 	}
 	if (choose_min && s->logarithmic)
-		s->min = fmax(h->n ? round_number(percentile(h, .01), 0) : 0,
-		              s->max / (h->n ? 10000 : 100));
+		s->min = fmax(h->n ? round_number(percentile(h, below_scale), 0) : 0,
+		              s->max / (h->n ? scale_reach : dark_reach));
 	else if (choose_min)
 		s->min = h->least < 0 ? -round_number(-h->least, 1) : 0;
 	/* A uniform picture of a round value, or all of it beyond the given end. */

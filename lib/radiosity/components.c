@@ -6,7 +6,8 @@
 #include "lib/data/punctual.h"
 #include "lib/scatter/bsdf.h"
 
-/* Albedos beyond this count as 1: no light is absorbed. */
+/* Albedos from this on count as 1: no light is absorbed. What is further off is more than sums
+ * of single-precision form factors may hide, and takes 1e9 reflections; a guess. */
 static const double white = 1 - 1e-9;
 
 /* ---- connected components: union-find with path halving ---- */

@@ -13,19 +13,24 @@
 #include "lib/radiosity/radiosity.h"
 #include "lib/scatter/bsdf.h"
 
-/* Feeds whose entries are on the way from memory. */
+/* Feeds whose entries are on the way from memory, a count: about what a core can have in flight.
+ * A guess; `make bench` (shoot, GB/s) shows what it does. */
 enum { AHEAD = 8 };
+
+/* Element-sides that a thread takes at a time when it writes them: any large number does. */
+enum { SIDES_AT_A_TIME = 4096 };
 
 enum part { DIRECT, CAUSTIC, INDIRECT, H_PARTS };
 
 /* A block that carries flux: what it adds to every receiver it lands on, per unit of
  * value. */
 struct feed {
-	lanes fresh, mixed;
+	lanes from_emitter, from_diffuse;
 	lanes_f32 variance;
 	const struct ff *f;
 	uint64_t block;              /* of f */
-	uint8_t to_fresh, carries;   /* enum part; bit 0: fresh flux, bit 1: mixed */
+	uint8_t emitter_part;        /* enum part that light from emitters adds to */
+	uint8_t carries;             /* bits 1 << FROM_EMITTER, 1 << FROM_DIFFUSE */
 };
 
 /* Where a feed's entries in a range begin. */
@@ -34,12 +39,12 @@ struct place {
 	uint32_t done;               /* entries of the span that begins there */
 };
 
-struct gather {
+struct element_pass {
 	const struct transport *t;
 	struct solution *s;
 	int to_patches;
 	size_t receivers;            /* elements or patches, 2 sides each */
-	const double *block_flux[2]; /* [blocks][channels] by freshness, over the block's sum */
+	const double *block_flux[2]; /* [blocks][channels] by origin, over the block's sum */
 	size_t ranges;               /* one a thread */
 	uint32_t *cut;               /* [ranges+1] receivers */
 	size_t feeds;
@@ -57,25 +62,25 @@ struct gather {
 
 /* Where a feed adds. */
 struct into {
-	lanes *fresh, *mixed;
+	lanes *from_emitter, *from_diffuse;
 	lanes_f32 *variance;
 };
 
 static ALWAYS_INLINE void add(const struct feed *x, const struct into *to, size_t at,
-                              double v, int fresh, int mixed)
+                              double v, int emitter, int diffuse)
 {
-	if (fresh)
-		to->fresh[at] += x->fresh * v;
-	if (mixed)
-		to->mixed[at] += x->mixed * v;
+	if (emitter)
+		to->from_emitter[at] += x->from_emitter * v;
+	if (diffuse)
+		to->from_diffuse[at] += x->from_diffuse * v;
 	to->variance[at] += x->variance * (float)v;
 }
 
 /* A feed's entries from p on that lie below a receiver. Inlined with constants, so
  * that each case is a loop of its own. */
-static ALWAYS_INLINE void add_list(const struct gather *g, const struct feed *x,
+static ALWAYS_INLINE void add_list(const struct element_pass *pass, const struct feed *x,
                                    const struct into *to, struct place p, uint32_t below,
-                                   int f32, int fresh, int mixed)
+                                   int f32, int emitter, int diffuse)
 {
 	const struct ff *f = x->f;
 	const uint64_t n = f->block.start[x->block + 1] - p.entry;
@@ -84,15 +89,15 @@ static ALWAYS_INLINE void add_list(const struct gather *g, const struct feed *x,
 		uint32_t column = ff_word(f, p.word + i);
 		if (column >> 1 >= below)
 			break;
-		size_t at = (column >> 1) + (column & 1 ? g->receivers : 0);
+		size_t at = (column >> 1) + (column & 1 ? pass->receivers : 0);
 		double v = f32 ? (double)f->value[p.entry + i] : f->value64[p.entry + i];
-		add(x, to, at, v, fresh, mixed);
+		add(x, to, at, v, emitter, diffuse);
 	}
 }
 
-static ALWAYS_INLINE void add_spans(const struct gather *g, const struct feed *x,
+static ALWAYS_INLINE void add_spans(const struct element_pass *pass, const struct feed *x,
                                     const struct into *to, struct place p, uint32_t below,
-                                    int f32, int fresh, int mixed)
+                                    int f32, int emitter, int diffuse)
 {
 	const struct ff *f = x->f;
 	const uint64_t end = f->block.start[x->block + 1];
@@ -100,7 +105,7 @@ static ALWAYS_INLINE void add_spans(const struct gather *g, const struct feed *x
 	for (int cut = 0; p.entry < end && !cut; p.word += 2, p.done = 0) {
 		uint32_t column = ff_word(f, p.word), first = (column >> 1) + p.done;
 		uint32_t last = first + ff_word(f, p.word + 1) - p.done;
-		size_t back = column & 1 ? g->receivers : 0;
+		size_t back = column & 1 ? pass->receivers : 0;
 		if (first >= below)
 			break;
 		cut = last > below;
@@ -108,35 +113,35 @@ static ALWAYS_INLINE void add_spans(const struct gather *g, const struct feed *x
 			last = below;
 		for (size_t at = first + back; at < last + back; at++, p.entry++) {
 			double v = f32 ? (double)f->value[p.entry] : f->value64[p.entry];
-			add(x, to, at, v, fresh, mixed);
+			add(x, to, at, v, emitter, diffuse);
 		}
 	}
 }
 
-static ALWAYS_INLINE void add_as(const struct gather *g, const struct feed *x,
+static ALWAYS_INLINE void add_as(const struct element_pass *pass, const struct feed *x,
                                  const struct into *to, struct place p, uint32_t below,
-                                 int f32, int fresh, int mixed)
+                                 int f32, int emitter, int diffuse)
 {
 	if (ff_has_spans(x->f, x->block))
-		add_spans(g, x, to, p, below, f32, fresh, mixed);
+		add_spans(pass, x, to, p, below, f32, emitter, diffuse);
 	else
-		add_list(g, x, to, p, below, f32, fresh, mixed);
+		add_list(pass, x, to, p, below, f32, emitter, diffuse);
 }
 
-static void add_feed(const struct gather *g, const struct feed *x, struct place p,
+static void add_feed(const struct element_pass *pass, const struct feed *x, struct place p,
                      uint32_t below)
 {
-	const struct into to = { g->flux[x->to_fresh], g->flux[INDIRECT],
-		                 g->variance[x->to_fresh != DIRECT || !(x->carries & 1)] };
+	const struct into to = { pass->flux[x->emitter_part], pass->flux[INDIRECT],
+		                 pass->variance[x->emitter_part != DIRECT || !(x->carries & 1)] };
 
 	if (x->f->value && x->carries == 2)
-		add_as(g, x, &to, p, below, 1, 0, 1);
+		add_as(pass, x, &to, p, below, 1, 0, 1);
 	else if (x->f->value && x->carries == 1)
-		add_as(g, x, &to, p, below, 1, 1, 0);
+		add_as(pass, x, &to, p, below, 1, 1, 0);
 	else if (x->f->value)
-		add_as(g, x, &to, p, below, 1, 1, 1);
+		add_as(pass, x, &to, p, below, 1, 1, 1);
 	else
-		add_as(g, x, &to, p, below, 0, x->carries & 1, x->carries >> 1);
+		add_as(pass, x, &to, p, below, 0, x->carries & 1, x->carries >> 1);
 }
 
 static void seek_span(const struct feed *x, uint32_t receiver, struct place *p)
@@ -187,17 +192,17 @@ static struct place find_place(const struct feed *x, uint32_t receiver)
 
 static void add_range(void *arg, size_t begin, size_t end, int thread)
 {
-	const struct gather *g = arg;
+	const struct element_pass *pass = arg;
 	struct place place[AHEAD];
 
 	(void)thread;
 	for (size_t range = begin; range < end; range++)
-		for (size_t i = 0; i < g->feeds + AHEAD; i++) {
+		for (size_t i = 0; i < pass->feeds + AHEAD; i++) {
 			struct place *p = &place[i % AHEAD];
 			if (i >= AHEAD)
-				add_feed(g, &g->feed[i - AHEAD], *p, g->cut[range + 1]);
-			if (i < g->feeds)
-				*p = find_place(&g->feed[i], g->cut[range]);
+				add_feed(pass, &pass->feed[i - AHEAD], *p, pass->cut[range + 1]);
+			if (i < pass->feeds)
+				*p = find_place(&pass->feed[i], pass->cut[range]);
 		}
 }
 
@@ -214,73 +219,73 @@ static enum part part_of(const struct transport *t, uint32_t row, uint32_t chain
  * rows, as if each sample were independent, as row_samples allows for: a row of n
  * samples that sends flux U, of which f lands here, adds U^2 f / n; one without samples,
  * 0. For the four bands with the number of the channels in work. */
-static lanes variance_of(const struct gather *g, uint32_t row, uint64_t b)
+static lanes variance_of(const struct element_pass *pass, uint32_t row, uint64_t b)
 {
-	const struct transport *t = g->t;
+	const struct transport *t = pass->t;
 	uint32_t samples = t->row_samples[row];
-	size_t bands = (size_t)g->s->bands;
+	size_t bands = (size_t)pass->s->bands;
 	double one = samples ? t->block[t->row_block[row]].sum / samples : 0;
 	lanes v = { 0 };
 
-	for (size_t k = 0; k < LANES && g->first + k < bands; k++) {
+	for (size_t k = 0; k < LANES && pass->first + k < bands; k++) {
 		double all = 0;
-		for (size_t c = g->first + k; c < g->channels; c += bands)
-			all += g->block_flux[0][b * g->channels + c] +
-			       g->block_flux[1][b * g->channels + c];
+		for (size_t c = pass->first + k; c < pass->channels; c += bands)
+			all += pass->block_flux[0][b * pass->channels + c] +
+			       pass->block_flux[1][b * pass->channels + c];
 		v[k] = all * all * one;
 	}
 	return v;
 }
 
 /* Float sums of variances stay in range whatever the unit of flux is. */
-static void set_unit(struct gather *g)
+static void set_unit(struct element_pass *pass)
 {
-	const struct transport *t = g->t;
+	const struct transport *t = pass->t;
 
-	g->unit = 0;
+	pass->unit = 0;
 	for (uint32_t row = 0; row < t->rows; row++)
 		for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
-			lanes v = variance_of(g, row, b);
+			lanes v = variance_of(pass, row, b);
 			for (int k = 0; k < LANES; k++)
-				g->unit = fmax(g->unit, v[k]);
+				pass->unit = fmax(pass->unit, v[k]);
 		}
-	if (!(g->unit >= DBL_MIN))
-		g->unit = 1;
+	if (!(pass->unit >= DBL_MIN))
+		pass->unit = 1;
 }
 
-static void set_feed(const struct gather *g, uint32_t row, uint64_t b, uint8_t carries,
+static void set_feed(const struct element_pass *pass, uint32_t row, uint64_t b, uint8_t carries,
                      struct feed *x)
 {
-	const struct block *block = &g->t->block[b];
-	size_t at = b * g->channels + g->first;
+	const struct block *block = &pass->t->block[b];
+	size_t at = b * pass->channels + pass->first;
 
-	*x = (struct feed){ .f = g->t->shard[block->shard], .block = block->local,
-	                    .to_fresh = (uint8_t)part_of(g->t, row, block->chain),
+	*x = (struct feed){ .f = pass->t->shard[block->shard], .block = block->local,
+	                    .emitter_part = (uint8_t)part_of(pass->t, row, block->chain),
 	                    .carries = carries };
-	for (size_t k = 0; k < LANES && g->first + k < g->channels; k++) {
-		x->fresh[k] = g->block_flux[0][at + k];
-		x->mixed[k] = g->block_flux[1][at + k];
+	for (size_t k = 0; k < LANES && pass->first + k < pass->channels; k++) {
+		x->from_emitter[k] = pass->block_flux[0][at + k];
+		x->from_diffuse[k] = pass->block_flux[1][at + k];
 	}
-	x->variance = __builtin_convertvector(variance_of(g, row, b) * (1 / g->unit), lanes_f32);
+	x->variance = __builtin_convertvector(variance_of(pass, row, b) * (1 / pass->unit), lanes_f32);
 }
 
 /* Blocks with flux in the four channels in work, or any where they have variances. */
-static void set_feeds(struct gather *g)
+static void set_feeds(struct element_pass *pass)
 {
-	const struct transport *t = g->t;
-	const size_t last = g->first < (size_t)g->s->bands ? g->channels : g->first + LANES;
+	const struct transport *t = pass->t;
+	const size_t last = pass->first < (size_t)pass->s->bands ? pass->channels : pass->first + LANES;
 
-	g->feeds = 0;
+	pass->feeds = 0;
 	for (uint32_t row = 0; row < t->rows; row++)
 		for (uint64_t b = t->row_block[row]; b < t->row_block[row + 1]; b++) {
 			unsigned carries = 0;
-			for (size_t c = g->first; c < last && c < g->channels; c++) {
-				size_t at = b * g->channels + c;
-				carries |= (g->block_flux[0][at] > 0) |
-				           (unsigned)(g->block_flux[1][at] > 0) << 1;
+			for (size_t c = pass->first; c < last && c < pass->channels; c++) {
+				size_t at = b * pass->channels + c;
+				carries |= (pass->block_flux[0][at] > 0) |
+				           (unsigned)(pass->block_flux[1][at] > 0) << 1;
 			}
 			if (carries)
-				set_feed(g, row, b, (uint8_t)carries, &g->feed[g->feeds++]);
+				set_feed(pass, row, b, (uint8_t)carries, &pass->feed[pass->feeds++]);
 		}
 }
 
@@ -288,71 +293,71 @@ static void set_feeds(struct gather *g)
 
 static void put_channels(void *arg, size_t begin, size_t end, int thread)
 {
-	const struct gather *g = arg;
-	const struct model *m = g->t->m;
-	double *to[H_PARTS] = { g->s->irradiance.direct, g->s->irradiance.caustic, g->s->irradiance.indirect };
-	size_t bands = (size_t)g->s->bands;
+	const struct element_pass *pass = arg;
+	const struct model *m = pass->t->m;
+	double *to[H_PARTS] = { pass->s->irradiance.direct, pass->s->irradiance.caustic, pass->s->irradiance.indirect };
+	size_t bands = (size_t)pass->s->bands;
 
 	(void)thread;
 	for (size_t es = begin; es < end; es++) {
 		uint32_t element = (uint32_t)(es >> 1), patch = m->element.patch[element];
-		size_t side = (es & 1) * g->receivers;
-		size_t from = side + (g->to_patches ? patch : element);
-		double area = g->to_patches ? m->patch.area[patch] : m->element.area[element];
-		for (size_t k = 0; k < LANES && g->first + k < g->channels; k++) {
-			size_t c = g->first + k;
-			size_t at = (c / bands * g->s->element_sides + es) * bands + c % bands;
+		size_t side = (es & 1) * pass->receivers;
+		size_t from = side + (pass->to_patches ? patch : element);
+		double area = pass->to_patches ? m->patch.area[patch] : m->element.area[element];
+		for (size_t k = 0; k < LANES && pass->first + k < pass->channels; k++) {
+			size_t c = pass->first + k;
+			size_t at = (c / bands * pass->s->element_sides + es) * bands + c % bands;
 			for (int p = 0; p < H_PARTS; p++)
-				to[p][at] = g->flux[p][from][k] / area;
+				to[p][at] = pass->flux[p][from][k] / area;
 			if (c < bands) {
-				double direct = (double)g->variance[0][from][k] * g->unit;
-				double other = (double)g->variance[1][from][k] * g->unit;
-				g->s->error.sampling_direct[at] = sqrt(direct) / area;
-				g->s->error.sampling[at] = sqrt(direct + other) / area;
+				double direct = (double)pass->variance[0][from][k] * pass->unit;
+				double other = (double)pass->variance[1][from][k] * pass->unit;
+				pass->s->error.sampling_direct[at] = sqrt(direct) / area;
+				pass->s->error.sampling[at] = sqrt(direct + other) / area;
 			}
 		}
 	}
 }
 
 /* Bytes of the values that are read and, where columns are lists, of these. */
-static double bytes_of(const struct gather *g)
+static double bytes_of(const struct element_pass *pass)
 {
 	double bytes = 0;
 
-	for (size_t i = 0; i < g->feeds; i++) {
-		const struct ff *f = g->feed[i].f;
-		const uint64_t *entry = f->block.start + g->feed[i].block;
+	for (size_t i = 0; i < pass->feeds; i++) {
+		const struct ff *f = pass->feed[i].f;
+		const uint64_t *entry = f->block.start + pass->feed[i].block;
 		size_t word = f->column16 ? sizeof *f->column16 : sizeof *f->column;
 		size_t value = f->value ? sizeof *f->value : sizeof *f->value64;
 		bytes += (double)(entry[1] - entry[0]) *
-		         (double)(value + (ff_has_spans(f, g->feed[i].block) ? 0 : word));
+		         (double)(value + (ff_has_spans(f, pass->feed[i].block) ? 0 : word));
 	}
 	return bytes;
 }
 
-static int gather_channels(struct gather *g, int threads, struct err *e)
+static int add_channels(struct element_pass *pass, int threads, struct err *e)
 {
-	size_t n = 2 * g->receivers;
+	size_t n = 2 * pass->receivers;
 	void *room, *variance, *feed;
 	lanes *at = lanes_new(H_PARTS * n, &room, "irradiance", e);
 
-	g->variance[0] = (lanes_f32 *)lanes_new(n, &variance, "irradiance", e);
-	g->variance[1] = g->variance[0] + n;
-	g->feed = (struct feed *)lanes_new(g->t->blocks * (sizeof *g->feed / sizeof(lanes)), &feed,
+	pass->variance[0] = (lanes_f32 *)lanes_new(n, &variance, "irradiance", e);
+	pass->variance[1] = pass->variance[0] + n;
+	pass->feed = (struct feed *)lanes_new(pass->t->blocks * (sizeof *pass->feed / sizeof(lanes)), &feed,
 	                                   "flux by chain", e);
-	int bad = !at || !variance || !g->feed;
+	int bad = !at || !variance || !pass->feed;
 	for (int p = 0; !bad && p < H_PARTS; p++)
-		g->flux[p] = at + (size_t)p * n;
-	for (g->first = 0; !bad && g->first < g->channels; g->first += LANES) {
-		if (g->first) {
+		pass->flux[p] = at + (size_t)p * n;
+	for (pass->first = 0; !bad && pass->first < pass->channels; pass->first += LANES) {
+		if (pass->first) {
 			memset(at, 0, H_PARTS * n * sizeof *at);
-			memset(g->variance[0], 0, 2 * n * sizeof **g->variance);
+			memset(pass->variance[0], 0, 2 * n * sizeof **pass->variance);
 		}
-		set_unit(g);
-		set_feeds(g);
-		par_for(g->ranges, 1, threads, add_range, g, NULL);
-		par_for(g->s->element_sides, 4096, threads, put_channels, g, NULL);
-		g->bytes += bytes_of(g);
+		set_unit(pass);
+		set_feeds(pass);
+		par_for(pass->ranges, 1, threads, add_range, pass, NULL);
+		par_for(pass->s->element_sides, SIDES_AT_A_TIME, threads, put_channels, pass, NULL);
+		pass->bytes += bytes_of(pass);
 	}
 	free(room);
 	free(variance);
@@ -366,34 +371,34 @@ static int gather_channels(struct gather *g, int threads, struct err *e)
 static int block_fluxes(const struct transport *t, const struct solution *s, double *flux[2],
                         struct err *e)
 {
-	struct propagator sender;
+	struct propagator propagator;
 	size_t channels = solution_channels(s);
-	int bad = radiosity_propagator_init(&sender, t, s->groups, e);
+	int bad = radiosity_propagator_init(&propagator, t, s->groups, e);
 
 	for (uint32_t r = 0; !bad && r < t->rows; r++)
-		for (int fresh = 0; fresh < 2; fresh++) {
-			double *to = flux[fresh] + t->row_block[r] * channels;
-			radiosity_propagate_block_flux(&sender, r, s->shot + (2 * (size_t)r + (size_t)fresh) * channels,
+		for (int origin = 0; origin < ORIGINS; origin++) {
+			double *to = flux[origin] + t->row_block[r] * channels;
+			radiosity_propagate_block_flux(&propagator, r, s->shot + (2 * (size_t)r + (size_t)origin) * channels,
 			                               to);
 			for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
 				for (size_t c = 0; c < channels; c++)
 					*to++ /= t->block[b].sum > 0 ? t->block[b].sum : 1;
 		}
-	radiosity_propagator_free(&sender);
+	radiosity_propagator_free(&propagator);
 	return bad;
 }
 
-static int cut_ranges(struct gather *g, struct err *e)
+static int cut_ranges(struct element_pass *pass, struct err *e)
 {
-	const struct model *m = g->t->m;
+	const struct model *m = pass->t->m;
 	uint32_t i = 0;
 
-	if (!(g->cut = mem_new(g->ranges + 1, sizeof *g->cut, "irradiance", e)))
+	if (!(pass->cut = mem_new(pass->ranges + 1, sizeof *pass->cut, "irradiance", e)))
 		return -1;
 	for (uint32_t p = 0; p <= m->patch.n; p++) {
-		uint32_t begin = g->to_patches ? p : m->patch.start[p];
-		for (; i <= g->ranges && begin * (uint64_t)g->ranges >= i * (uint64_t)g->receivers; i++)
-			g->cut[i] = begin;
+		uint32_t begin = pass->to_patches ? p : m->patch.start[p];
+		for (; i <= pass->ranges && begin * (uint64_t)pass->ranges >= i * (uint64_t)pass->receivers; i++)
+			pass->cut[i] = begin;
 	}
 	return 0;
 }
@@ -402,18 +407,18 @@ int radiosity_element_irradiance(struct solution *s, const struct transport *t, 
                                  struct radiosity_report *r, struct err *e)
 {
 	double *flux[2];
-	struct gather g = { .t = t, .s = s, .to_patches = t->shard[0]->to_patches,
+	struct element_pass pass = { .t = t, .s = s, .to_patches = t->shard[0]->to_patches,
 	                    .channels = solution_channels(s),
 	                    .ranges = threads > 1 ? (size_t)threads : 1 };
 
-	g.receivers = g.to_patches ? t->m->patch.n : t->m->element.n;
+	pass.receivers = pass.to_patches ? t->m->patch.n : t->m->element.n;
 	for (int i = 0; i < 2; i++)
-		g.block_flux[i] = flux[i] = mem_new(t->blocks, g.channels * sizeof(double),
+		pass.block_flux[i] = flux[i] = mem_new(t->blocks, pass.channels * sizeof(double),
 		                                    "flux by chain", e);
 	int bad = !flux[0] || !flux[1] || block_fluxes(t, s, flux, e) ||
-	          cut_ranges(&g, e) || gather_channels(&g, threads, e);
-	r->gather_bytes = g.bytes;
-	free(g.cut);
+	          cut_ranges(&pass, e) || add_channels(&pass, threads, e);
+	r->element_bytes = pass.bytes;
+	free(pass.cut);
 	free(flux[0]);
 	free(flux[1]);
 	return bad ? -1 : 0;

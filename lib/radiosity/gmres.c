@@ -15,15 +15,32 @@
 #include "lib/radiosity/propagate_exact.h"
 #include "lib/radiosity/shoot.h"
 
+/* Steps of GMRES, each one more vector of the basis: at most, and at least however much memory
+ * that takes. A guess; a residual left after them is shot as any other, or overshot again. */
 enum { BASIS_MAX = 40, BASIS_MIN = 4 };
 
-/* Bytes that the basis may take. */
+/* Bytes that the basis may take beyond BASIS_MIN vectors: 512 MiB, a guess. */
 static const double basis_bytes = 1 << 29;
+
+/* Parts of a vector's norm before Gram-Schmidt: less is what rounding has left (a few DBL_EPSILON
+ * of a sum of items), and no direction. */
+static const double rounding = 1e-14;
+
+/* An albedo that is added to all in the weights, so that black sides have a finite one: a
+ * guess. */
+static const double albedo_least = .01;
+
+/* The residual aimed at, over what unshot flux may be left. Light that is absorbed slowly does
+ * many times what is unshot; two digits more cost a pass or two. */
+static const double spare = .01;
+
+/* Of what was unshot: overshooting that leaves more has failed. A guess. */
+static const double success = .9;
 
 struct gmres {
 	struct shooter *v;
 	size_t vectors, channels;
-	size_t items;         /* diffuse sides, then links by freshness */
+	size_t items;         /* diffuse sides, then links by origin */
 	size_t size;          /* items x vectors */
 	size_t most;          /* steps */
 	lanes *weight;        /* [2P][vectors] */
@@ -97,11 +114,11 @@ static void divide(const struct gmres *k, const lanes *f, lanes *x)
 
 /* ---- K ---- */
 
-/* y = x - K x. The sender's own unshot flux gives way to y meanwhile. */
+/* y = x - K x. The propagator's own unshot flux gives way to y meanwhile. */
 static void apply(struct gmres *k, const lanes *x, lanes *y)
 {
 	struct shooter *v = k->v;
-	struct propagator *s = &v->sender;
+	struct propagator *s = &v->propagator;
 	lanes *diffuse = s->unshot_diffuse, *link = s->unshot_link;
 	size_t n = k->vectors, sides = v->s->patch_sides;
 
@@ -112,7 +129,7 @@ static void apply(struct gmres *k, const lanes *x, lanes *y)
 		radiosity_shoot_diffuse(v, (uint32_t)i, x + i * n, NULL);
 	for (size_t l = 0; l < 2 * v->s->links; l++)
 		radiosity_shoot_link(v, l, x + (sides + l) * n, NULL);
-	radiosity_shot_ledger_clear(&v->sent);
+	radiosity_shot_ledger_clear(&v->booked);
 	s->unshot_diffuse = diffuse;
 	s->unshot_link = link;
 	for (size_t i = 0; i < k->size; i++)
@@ -161,9 +178,8 @@ static void arnoldi(struct gmres *k, size_t j)
 		add(k, minus, basis_at(k, i), w);
 	}
 	norm(k, w, next);
-	/* What rounding has left is no direction. */
 	for (size_t c = 0; c < k->channels; c++)
-		if (((double *)next)[c] <= 1e-14 * ((double *)before)[c])
+		if (((double *)next)[c] <= rounding * ((double *)before)[c])
 			((double *)next)[c] = 0;
 	divide(k, next, w);
 }
@@ -225,25 +241,25 @@ static lanes *solution_of(struct gmres *k, size_t steps)
 /* ---- shots ---- */
 
 /* What a row has sent in all cannot be negative: raises flux so that it is not. */
-static void limit(const struct gmres *k, uint32_t row, int freshness, const lanes *share,
+static void limit(const struct gmres *k, uint32_t row, int origin, const lanes *share,
                   lanes *flux)
 {
-	const double *shot = k->v->s->shot + (2 * (size_t)row + (size_t)freshness) * k->channels;
+	const double *shot = k->v->s->shot + (2 * (size_t)row + (size_t)origin) * k->channels;
 
 	if (row == FF_NO_ROW)
 		return;
 	for (size_t c = 0; c < k->channels; c++) {
-		double part = share ? ((const double *)share)[c] : 1;
+		double by = share ? ((const double *)share)[c] : 1;
 		double *x = (double *)flux + c;
-		if (part > 0 && *x * part < -shot[c])
-			*x = -shot[c] / part * (1 - 1e-15);
+		if (by > 0 && *x * by < -shot[c])
+			*x = -shot[c] / by * (1 - 1e-15); /* rounding does not pass 0 */
 	}
 }
 
 static void shoot_side(struct gmres *k, uint32_t ps, lanes *d)
 {
 	struct shooter *v = k->v;
-	struct propagator *s = &v->sender;
+	struct propagator *s = &v->propagator;
 	const struct transport *t = v->t;
 	size_t n = k->vectors;
 	const lanes *share = radiosity_propagator_share(s, ps);
@@ -251,7 +267,7 @@ static void shoot_side(struct gmres *k, uint32_t ps, lanes *d)
 	limit(k, t->diffuse_row[ps], FROM_DIFFUSE, NULL, d + ps * n);
 	radiosity_exact_take(s, radiosity_exact_diffuse(s, ps), d + ps * n);
 	radiosity_shoot_diffuse(v, ps, d + ps * n, v->s->shot);
-	radiosity_exact_return(s, radiosity_exact_diffuse(s, ps), &v->sent);
+	radiosity_exact_return(s, radiosity_exact_diffuse(s, ps), &v->booked);
 	for (uint64_t l = 2 * t->target_link[ps]; l < 2 * t->target_link[ps + 1]; l++) {
 		lanes *flux = d + (v->s->patch_sides + l) * n;
 		for (uint64_t way = 0; way < 2; way++)
@@ -259,7 +275,7 @@ static void shoot_side(struct gmres *k, uint32_t ps, lanes *d)
 			      share + way * n, flux);
 		radiosity_exact_take(s, radiosity_exact_link(s, l), flux);
 		radiosity_shoot_link(v, l, flux, v->s->shot);
-		radiosity_exact_return(s, radiosity_exact_link(s, l), &v->sent);
+		radiosity_exact_return(s, radiosity_exact_link(s, l), &v->booked);
 	}
 	radiosity_book(v, NULL);
 	v->s->shots++;
@@ -269,9 +285,9 @@ static void shoot_side(struct gmres *k, uint32_t ps, lanes *d)
 
 static int krylov_init(struct gmres *k, struct shooter *v, struct err *e)
 {
-	size_t n = v->sender.vectors, sides = v->s->patch_sides;
+	size_t n = v->propagator.vectors, sides = v->s->patch_sides;
 
-	*k = (struct gmres){ .v = v, .vectors = n, .channels = v->sender.channels,
+	*k = (struct gmres){ .v = v, .vectors = n, .channels = v->propagator.channels,
 	                      .items = sides + 2 * v->s->links };
 	k->size = k->items * n;
 	k->most = (size_t)fmin(BASIS_MAX, fmax(BASIS_MIN, basis_bytes /
@@ -292,19 +308,19 @@ static void krylov_free(struct gmres *k)
 		free(k->room[i]);
 }
 
-/* 1 / (area x albedo x emitted^2); albedos below a percent count as one. */
+/* 1 / (area x albedo x emitted^2). */
 static void set_weights(struct gmres *k)
 {
 	const struct shooter *v = k->v;
-	const struct propagator *s = &v->sender;
+	const struct propagator *s = &v->propagator;
 	size_t n = k->vectors;
 
 	for (uint32_t ps = 0; ps < v->s->patch_sides; ps++)
 		for (size_t i = 0; i < n; i++) {
-			const lanes *here = s->part + s->surface[ps] * SPLITS * n + i;
-			const lanes *there = s->part + s->surface[ps ^ 1] * SPLITS * n + i;
+			const lanes *here = s->split + s->surface[ps] * SPLITS * n + i;
+			const lanes *there = s->split + s->surface[ps ^ 1] * SPLITS * n + i;
 			lanes albedo = here[SPLIT_RHO * n] + here[SPLIT_LOBES * n] +
-			               there[SPLIT_TAU * n] + .01;
+			               there[SPLIT_TAU * n] + albedo_least;
 			lanes w = v->weight[v->components.of[ps] * n + i];
 			k->weight[ps * n + i] = w * w / (albedo * v->t->m->patch.area[ps >> 1]);
 		}
@@ -325,9 +341,7 @@ static void shoot_emission(struct shooter *v)
 
 int radiosity_gmres_finish(struct shooter *v, double worst, double stop, struct err *e)
 {
-	/* Light that is absorbed slowly does many times what is unshot; two digits more cost
-	 * a pass or two. */
-	const double target = .01 * stop / worst;
+	const double target = spare * stop / worst;
 	struct gmres k;
 	struct propagate_exact exact;
 	double left = worst;
@@ -336,17 +350,17 @@ int radiosity_gmres_finish(struct shooter *v, double worst, double stop, struct 
 	if (!bad) {
 		shoot_emission(v);
 		set_weights(&k);
-		memcpy(k.basis, v->sender.unshot_diffuse,
+		memcpy(k.basis, v->propagator.unshot_diffuse,
 		       v->s->patch_sides * k.vectors * sizeof(lanes));
-		memcpy(k.basis + v->s->patch_sides * k.vectors, v->sender.unshot_link,
+		memcpy(k.basis + v->s->patch_sides * k.vectors, v->propagator.unshot_link,
 		       2 * v->s->links * k.vectors * sizeof(lanes));
 		lanes *d = solution_of(&k, iterate(&k, target));
-		bad = radiosity_exact_begin(&v->sender, &exact, e);
+		bad = radiosity_exact_begin(&v->propagator, &exact, e);
 		for (uint32_t ps = 0; !bad && ps < v->s->patch_sides; ps++)
 			shoot_side(&k, ps, d);
-		radiosity_exact_end(&v->sender);
+		radiosity_exact_end(&v->propagator);
 		radiosity_survey(v, &left);
 	}
 	krylov_free(&k);
-	return bad ? -1 : left < .9 * worst;
+	return bad ? -1 : left < success * worst;
 }

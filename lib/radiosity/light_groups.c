@@ -141,7 +141,7 @@ static const char *factors(const struct solution *s, const char *text, double *f
 
 static void scale_irradiance(struct solution *s, const double *factor)
 {
-	double *part[] = { s->irradiance.direct, s->irradiance.caustic, s->irradiance.indirect };
+	double *h[] = { s->irradiance.direct, s->irradiance.caustic, s->irradiance.indirect };
 	size_t bands = (size_t)s->bands, n = s->element_sides * bands;
 
 	for (size_t i = 0; i < n; i++) {
@@ -150,7 +150,7 @@ static void scale_irradiance(struct solution *s, const double *factor)
 			double f = factor[g * bands + i % bands];
 			most = fmax(most, f);
 			for (int p = 0; p < 3; p++)
-				part[p][g * n + i] *= f;
+				h[p][g * n + i] *= f;
 		}
 		double after = solution_irradiance(s, i / bands, (int)(i % bands));
 		double change = before > 0 ? after / before : most;

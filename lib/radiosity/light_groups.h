@@ -17,7 +17,7 @@ int radiosity_groups_set(struct solution *s, const struct model *m, int apart, s
 
 /* Scales the light of groups: "NAME=F,NAME=F:F:F,...", a factor >= 0 for all bands or one
  * for each. Irradiance and what its materials and lights emit are scaled; stated errors
- * keep their ratio to the irradiance. The solver's state is no longer of use. 0, or -1
+ * keep their ratio to the irradiance. What was unshot is no longer of use. 0, or -1
  * and e with the names there are. O(groups x element sides). */
 int radiosity_groups_mix(struct solution *s, struct model *m, const char *mix, struct err *e);
 

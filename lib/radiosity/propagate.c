@@ -8,7 +8,7 @@
 #include "lib/scatter/bsdf.h"
 
 /* How the sides of materials split the flux that arrives on them. */
-static void fill_parts(struct propagator *s)
+static void fill_splits(struct propagator *s)
 {
 	const struct materials *mt = &s->m->material;
 	size_t width = LANES * s->vectors;
@@ -17,7 +17,7 @@ static void fill_parts(struct propagator *s)
 		uint32_t material = i >> 1;
 		int side = (int)(i & 1);
 		size_t at = model_material_at(mt, material, side);
-		double *part = (double *)(s->part + i * SPLITS * s->vectors);
+		double *part = (double *)(s->split + i * SPLITS * s->vectors);
 		double *share = (double *)(s->share + i * 2 * s->vectors);
 		int lobe_r = bsdf_has_lobe(mt, material, side, 0);
 		int lobe_t = bsdf_has_lobe(mt, material, side, 1);
@@ -70,12 +70,12 @@ int radiosity_propagator_init(struct propagator *s, const struct transport *t, s
 	s->chain_flux = mem_new(t->chains.n, s->channels * sizeof(double), "chain flux", e);
 	s->touched = mem_new(t->chains.n, sizeof *s->touched, "chain flux", e);
 	s->is_touched = mem_new(t->chains.n, 1, "chain flux", e);
-	s->part = lanes_new(2 * t->m->material.n * SPLITS * s->vectors, &s->room[0], "albedos", e);
+	s->split = lanes_new(2 * t->m->material.n * SPLITS * s->vectors, &s->room[0], "albedos", e);
 	s->share = lanes_new(2 * t->m->material.n * 2 * s->vectors, &s->room[3], "albedos", e);
 	s->surface = mem_new(2 * t->m->patch.n, sizeof *s->surface, "albedos", e);
-	if (!s->chain_flux || !s->touched || !s->is_touched || !s->part || !s->share || !s->surface)
+	if (!s->chain_flux || !s->touched || !s->is_touched || !s->split || !s->share || !s->surface)
 		return -1;
-	fill_parts(s);
+	fill_splits(s);
 	return 0;
 }
 
@@ -167,7 +167,21 @@ static void finish(struct propagator *s, lanes *cut)
 
 /* ---- landing ---- */
 
-enum { LANDING_MAX = 4, FETCHED = 16, LINE = 64 };
+/* Vectors that land together: their sums, coefficients and flux have to fit AVX2's 16
+ * registers. */
+enum { LANDING_MAX = 4 };
+
+/* Runs whose links are fetched together, ahead of adding to them; bytes of a line of the cache.
+ * FETCHED is a guess; `make bench` (shoot, GB/s) shows what it does. */
+enum { FETCHED = 16, LINE = 64 };
+
+/* Runs that stay in the first cache for all vectors of many channels, and runs of a row that are
+ * fetched before it is sent. Guesses, as above. */
+enum { TILE = 64, ROW_FETCHED = 64 };
+
+/* The part of a block's flux that comes back to it: with more, it would go round for ever, but for
+ * rounding. A guess, as `white` in components.c. */
+static const double endless = 1 - 1e-9;
 
 /* Flux landing from a block: N vectors of channels from v on of n, x by unit of the
  * values. The loops over runs are inlined with a constant N. */
@@ -175,7 +189,7 @@ struct landing {
 	const struct propagator *s;
 	const struct block *block;
 	size_t v, n;
-	int freshness;
+	int origin;
 	lanes x[LANDING_MAX];
 };
 
@@ -189,7 +203,7 @@ static ALWAYS_INLINE void land_diffuse(const struct landing *l, uint64_t run, si
 {
 	const uint32_t target = l->s->t->run_target[run];
 	const double value = l->s->t->run_sum[run];
-	const lanes *rho = l->s->part + l->s->surface[target] * SPLITS * n + l->v;
+	const lanes *rho = l->s->split + l->s->surface[target] * SPLITS * n + l->v;
 	lanes *unshot = l->s->unshot_diffuse + target * n + l->v;
 
 	for (size_t i = 0; i < N; i++) {
@@ -207,12 +221,12 @@ static ALWAYS_INLINE void land_general(const struct landing *l, uint64_t run, si
 	const uint32_t target = s->t->run_target[run];
 	const uint32_t link = s->t->run_link[l->block->link + (run - l->block->special)];
 	const double value = s->t->run_sum[run];
-	const lanes *part = s->part + s->surface[target] * SPLITS * n + l->v;
+	const lanes *part = s->split + s->surface[target] * SPLITS * n + l->v;
 	lanes *here = s->unshot_diffuse + target * n + l->v;
 	lanes *there = s->unshot_diffuse + (target ^ 1) * n + l->v, *to = NULL;
 
 	if (link < RUN_FOLLOWED)
-		to = s->unshot_link + (2 * (size_t)(link & ~RUN_GUESSED) + (size_t)l->freshness) * n +
+		to = s->unshot_link + (2 * (size_t)(link & ~RUN_GUESSED) + (size_t)l->origin) * n +
 		     l->v;
 	for (size_t i = 0; i < N; i++) {
 		lanes x = l->x[i] * value, same = part[SPLIT_RHO * n + i] * x;
@@ -233,21 +247,21 @@ static ALWAYS_INLINE void land_general(const struct landing *l, uint64_t run, si
 
 /* Links are all over memory: fetches what will be added to by up to FETCHED runs. */
 static void fetch_links(const struct propagator *s, const struct block *block, uint64_t run,
-                        uint64_t end, int freshness)
+                        uint64_t end, int origin)
 {
 	const uint32_t *link = s->t->run_link + block->link + (run - block->special);
 	const uint64_t n = end - run < FETCHED ? end - run : FETCHED;
 
 	for (uint64_t i = 0; i < n; i++) {
 		const lanes *to = s->unshot_link + s->vectors *
-		                  (2 * (size_t)(link[i] & ~RUN_GUESSED) + (size_t)freshness);
+		                  (2 * (size_t)(link[i] & ~RUN_GUESSED) + (size_t)origin);
 		for (size_t v = 0; link[i] < RUN_FOLLOWED && v < s->vectors; v += LINE / sizeof *to)
 			__builtin_prefetch(to + v, 1);
 	}
 }
 
 static ALWAYS_INLINE void land_all(const struct landing *l, uint64_t i, uint64_t end, size_t N,
-                                   size_t n, struct shot_ledger *sent)
+                                   size_t n, struct shot_ledger *ledger)
 {
 	const uint64_t special = l->block->special < end ? l->block->special : end;
 	struct landed sum[2 * LANDING_MAX] = { 0 };
@@ -267,61 +281,60 @@ static ALWAYS_INLINE void land_all(const struct landing *l, uint64_t i, uint64_t
 		sum[k].absorbed = sum[k].arrived - sum[k].kept;
 	for (; i < end; i++) {
 		if ((i - l->block->special) % FETCHED == 0 && l->v == 0 && i + FETCHED < l->block[1].run)
-			fetch_links(l->s, l->block, i + FETCHED, l->block[1].run, l->freshness);
+			fetch_links(l->s, l->block, i + FETCHED, l->block[1].run, l->origin);
 		land_general(l, i, N, n, sum);
 	}
 	for (size_t k = 0; k < N; k++) {
-		sent->kept[l->v + k] += sum[k].kept;
-		sent->absorbed[l->v + k] += sum[k].absorbed;
-		sent->cut[l->v + k] += sum[k].cut;
-		sent->guessed[l->v + k] += sum[k].guessed;
+		ledger->kept[l->v + k] += sum[k].kept;
+		ledger->absorbed[l->v + k] += sum[k].absorbed;
+		ledger->cut[l->v + k] += sum[k].cut;
+		ledger->guessed[l->v + k] += sum[k].guessed;
 	}
 }
 
 /* N of the n vectors; where these are all, the compiler knows n too. */
 static void land(const struct landing *l, size_t N, uint64_t begin, uint64_t end,
-                 struct shot_ledger *sent)
+                 struct shot_ledger *ledger)
 {
 	const int all = N == l->n;
 
 	switch (N) {
 	case 1:
-		all ? land_all(l, begin, end, 1, 1, sent) : land_all(l, begin, end, 1, l->n, sent);
+		all ? land_all(l, begin, end, 1, 1, ledger) : land_all(l, begin, end, 1, l->n, ledger);
 		break;
 	case 2:
-		all ? land_all(l, begin, end, 2, 2, sent) : land_all(l, begin, end, 2, l->n, sent);
+		all ? land_all(l, begin, end, 2, 2, ledger) : land_all(l, begin, end, 2, l->n, ledger);
 		break;
 	case 3:
-		land_all(l, begin, end, 3, l->n, sent);
+		land_all(l, begin, end, 3, l->n, ledger);
 		break;
 	case LANDING_MAX:
-		land_all(l, begin, end, LANDING_MAX, l->n, sent);
+		land_all(l, begin, end, LANDING_MAX, l->n, ledger);
 		break;
 	}
 }
 
-static void send_block(struct propagator *s, const struct block *block, int freshness,
-                       const lanes *in, struct shot_ledger *sent)
+static void send_block(struct propagator *s, const struct block *block, int origin,
+                       const lanes *in, struct shot_ledger *ledger)
 {
-	enum { TILE = 64 };          /* runs that stay in cache for all vectors */
 	const struct transport *t = s->t;
 	const uint64_t end = block[1].run;
 	const uint64_t tile = s->vectors > LANDING_MAX ? TILE : end - block->run;
-	struct landing l = { s, block, 0, s->vectors, freshness, { { 0 } } };
+	struct landing l = { s, block, 0, s->vectors, origin, { { 0 } } };
 
 	s->runs += end - block->run;
 	s->bytes += (double)(end - block->run) * (sizeof *t->run_target + sizeof *t->run_sum) +
 	            (double)(end - block->special) * sizeof *t->run_link;
 	if (s->exact) {
-		radiosity_exact_land(s, block, freshness, in, sent);
+		radiosity_exact_land(s, block, origin, in, ledger);
 		return;
 	}
-	fetch_links(s, block, block->special, end, freshness);
+	fetch_links(s, block, block->special, end, origin);
 	for (uint64_t i = block->run; i < end; i += tile)
 		for (l.v = 0; l.v < l.n; l.v += LANDING_MAX) {
 			size_t N = l.n - l.v < LANDING_MAX ? l.n - l.v : LANDING_MAX;
 			memcpy(l.x, in + l.v, N * sizeof *in);
-			land(&l, N, i, i + tile < end ? i + tile : end, sent);
+			land(&l, N, i, i + tile < end ? i + tile : end, ledger);
 		}
 }
 
@@ -359,16 +372,15 @@ static void go_round(struct propagator *s, const struct block *block, double *in
 	memset(ever, 0, s->vectors * sizeof *ever);
 	for (size_t c = 0; c < s->channels; c++) {
 		double g = gain[c % (size_t)s->bands];
-		((double *)ever)[c] = g < 1 - 1e-9 ? 0 : in[c];
-		in[c] = g < 1 - 1e-9 ? in[c] / (1 - g) : 0;
+		((double *)ever)[c] = g < endless ? 0 : in[c];
+		in[c] = g < endless ? in[c] / (1 - g) : 0;
 	}
 	for (size_t v = 0; cut && v < s->vectors; v++)
 		book(s, cut, v, ever[v]);
 }
 
-void radiosity_propagate_fetch(const struct propagator *s, uint32_t row, int freshness, int ahead)
+void radiosity_propagate_fetch(const struct propagator *s, uint32_t row, int origin, int ahead)
 {
-	enum { MOST = 64 };
 	const struct transport *t = s->t;
 	const struct block *block = &t->block[t->row_block[row]];
 
@@ -379,18 +391,18 @@ void radiosity_propagate_fetch(const struct propagator *s, uint32_t row, int fre
 	}
 	const uint64_t first = block->run, n = block[1].run - first;
 	if (ahead == 1) {
-		fetch_links(s, block, block->special, first + n, freshness);
+		fetch_links(s, block, block->special, first + n, origin);
 		return;
 	}
-	for (uint64_t i = first; i < first + (n < MOST ? n : MOST); i += LINE / sizeof *t->run_sum) {
+	for (uint64_t i = first; i < first + (n < ROW_FETCHED ? n : ROW_FETCHED); i += LINE / sizeof *t->run_sum) {
 		__builtin_prefetch(t->run_target + i);
 		__builtin_prefetch(t->run_sum + i);
 	}
 	__builtin_prefetch(t->run_link + block->link);
 }
 
-void radiosity_propagate_row(struct propagator *s, uint32_t row, int freshness, const lanes *flux,
-                             struct shot_ledger *sent)
+void radiosity_propagate_row(struct propagator *s, uint32_t row, int origin, const lanes *flux,
+                             struct shot_ledger *ledger)
 {
 	const struct transport *t = s->t;
 	const size_t n = s->vectors;
@@ -406,18 +418,18 @@ void radiosity_propagate_row(struct propagator *s, uint32_t row, int freshness, 
 		}
 		if (!(lanes_magnitude(in, n) > 0))
 			continue;
-		go_round(s, block, (double *)in, sent->cut);
+		go_round(s, block, (double *)in, ledger->cut);
 		for (size_t v = 0; v < n; v++) {
 			in[v] /= block->sum > 0 ? block->sum : 1;
-			book(s, sent->escaped, v, in[v] * block->escape);
-			book(s, sent->absorbed, v, in[v] * block->black);
-			book(s, sent->lost, v, in[v] * block->lost);
-			book(s, sent->cut, v, in[v] * block->cut);
+			book(s, ledger->escaped, v, in[v] * block->escape);
+			book(s, ledger->absorbed, v, in[v] * block->black);
+			book(s, ledger->lost, v, in[v] * block->lost);
+			book(s, ledger->cut, v, in[v] * block->cut);
 		}
-		send_block(s, block, freshness, in, sent);
+		send_block(s, block, origin, in, ledger);
 		send_on(s, block, (double *)in);
 	}
-	finish(s, sent->cut);
+	finish(s, ledger->cut);
 }
 
 void radiosity_propagate_block_flux(struct propagator *s, uint32_t row, const double *flux, double *block_flux)

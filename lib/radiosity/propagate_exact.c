@@ -63,12 +63,12 @@ void radiosity_exact_take(struct propagator *s, struct exact_item from, const la
 	}
 }
 
-void radiosity_exact_return(struct propagator *s, struct exact_item to, struct shot_ledger *sent)
+void radiosity_exact_return(struct propagator *s, struct exact_item to, struct shot_ledger *ledger)
 {
 	for (size_t v = 0; v < s->vectors; v++) {
 		lanes left = s->exact->due[v] + s->exact->due_low[v];
 		add(&to.flux[v], &to.low[v], left);
-		sent->kept[v] += left;
+		ledger->kept[v] += left;
 	}
 }
 
@@ -95,12 +95,12 @@ static void keep(struct exact_item to, size_t v, lanes x, struct landed *l)
 	add_to(&l->kept, x);
 }
 
-static void land(struct propagator *s, const struct block *block, uint64_t run, int freshness,
+static void land(struct propagator *s, const struct block *block, uint64_t run, int origin,
                  lanes in, size_t v, struct landed *l)
 {
 	const size_t n = s->vectors;
 	const uint32_t target = s->t->run_target[run];
-	const lanes *part = s->part + s->surface[target] * SPLITS * n + v;
+	const lanes *part = s->split + s->surface[target] * SPLITS * n + v;
 	const lanes x = in * s->t->run_sum[run], lobes = part[SPLIT_LOBES * n] * x;
 
 	add_to(&l->arrived, x);
@@ -113,7 +113,7 @@ static void land(struct propagator *s, const struct block *block, uint64_t run, 
 	if (link == FF_NO_ROW)
 		add_to(&l->cut, lobes);
 	else if (link != RUN_FOLLOWED)
-		keep(radiosity_exact_link(s, 2 * (uint64_t)(link & ~RUN_GUESSED) + (uint64_t)freshness), v,
+		keep(radiosity_exact_link(s, 2 * (uint64_t)(link & ~RUN_GUESSED) + (uint64_t)origin), v,
 		     lobes, l);
 	if (link != FF_NO_ROW && link != RUN_FOLLOWED && (link & RUN_GUESSED))
 		add_to(&l->guessed, lobes);
@@ -126,22 +126,22 @@ static void book_sum(struct propagate_exact *x, size_t v, const struct sum *s, l
 	*to += s->high + s->low;
 }
 
-void radiosity_exact_land(struct propagator *s, const struct block *block, int freshness, const lanes *in,
-                          struct shot_ledger *sent)
+void radiosity_exact_land(struct propagator *s, const struct block *block, int origin, const lanes *in,
+                          struct shot_ledger *ledger)
 {
 	for (size_t v = 0; v < s->vectors; v++) {
 		struct landed l = { 0 };
 		for (uint64_t i = block->run; i < block->ideal; i++)
-			land(s, block, i, freshness, in[v], v, &l);
+			land(s, block, i, origin, in[v], v, &l);
 		/* What is not kept: a product of the absorptance, which is small, would be off by
 		 * what that itself was rounded by. */
 		l.absorbed.high = (l.arrived.high - l.kept.high) - l.cut.high;
 		l.absorbed.low = (l.arrived.low - l.kept.low) - l.cut.low;
 		for (uint64_t i = block->ideal; i < block[1].run; i++)
-			land(s, block, i, freshness, in[v], v, &l);
-		book_sum(s->exact, v, &l.kept, &sent->kept[v]);
-		book_sum(s->exact, v, &l.absorbed, &sent->absorbed[v]);
-		book_sum(s->exact, v, &l.cut, &sent->cut[v]);
-		sent->guessed[v] += l.guessed.high;
+			land(s, block, i, origin, in[v], v, &l);
+		book_sum(s->exact, v, &l.kept, &ledger->kept[v]);
+		book_sum(s->exact, v, &l.absorbed, &ledger->absorbed[v]);
+		book_sum(s->exact, v, &l.cut, &ledger->cut[v]);
+		ledger->guessed[v] += l.guessed.high;
 	}
 }

@@ -1,4 +1,4 @@
-/* Sending without loss to rounding (private to the solver).
+/* Sending without loss to rounding (private to lib/radiosity).
  *
  * Where albedos are near 1, light goes round many thousand times before it is absorbed, and
  * a shot of all of it at once rounds what is large beside all that was emitted. So every
@@ -22,7 +22,7 @@ struct propagate_exact {
 int radiosity_exact_begin(struct propagator *s, struct propagate_exact *x, struct err *e);
 void radiosity_exact_end(struct propagator *s);
 
-/* Unshot flux that leaves a side diffusely, or by a link (2 link + freshness): [vectors]. */
+/* Unshot flux that leaves a side diffusely, or by a link (2 link + origin): [vectors]. */
 struct exact_item {
 	lanes *flux, *low;
 };
@@ -33,13 +33,14 @@ struct exact_item radiosity_exact_link(const struct propagator *s, uint64_t l);
 /* Takes flux out of an item, to be sent next; and puts back what came out nowhere, which
  * counts as kept. */
 void radiosity_exact_take(struct propagator *s, struct exact_item from, const lanes *flux);
-void radiosity_exact_return(struct propagator *s, struct exact_item to, struct shot_ledger *sent);
+void radiosity_exact_return(struct propagator *s, struct exact_item to,
+                            struct shot_ledger *ledger);
 
 /* Enters where flux in work came out, of vector v. */
 void radiosity_exact_book(struct propagate_exact *x, size_t v, lanes flux);
 
 /* Lands flux from a block, `in` by unit of the values. O(runs). */
-void radiosity_exact_land(struct propagator *s, const struct block *block, int freshness, const lanes *in,
-                          struct shot_ledger *sent);
+void radiosity_exact_land(struct propagator *s, const struct block *block, int origin,
+                          const lanes *in, struct shot_ledger *ledger);
 
 #endif

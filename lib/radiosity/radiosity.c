@@ -14,16 +14,16 @@ static int solution_arrays(struct solution *s, const struct model *m,
                            const struct transport *t, struct err *e)
 {
 	size_t bands = (size_t)m->bands, es = 2 * m->element.n, ps = 2 * m->patch.n;
-	size_t channels = solution_channels(s), parts = s->groups * es;
+	size_t channels = solution_channels(s), sides = s->groups * es;
 
 	s->element_sides = es;
 	s->patch_sides = ps;
 	s->sources = model_sources(m);
 	s->links = t->links;
 	s->rows = t->rows;
-	s->irradiance.direct = mem_new(parts, bands * sizeof(double), "irradiance", e);
-	s->irradiance.caustic = mem_new(parts, bands * sizeof(double), "irradiance", e);
-	s->irradiance.indirect = mem_new(parts, bands * sizeof(double), "irradiance", e);
+	s->irradiance.direct = mem_new(sides, bands * sizeof(double), "irradiance", e);
+	s->irradiance.caustic = mem_new(sides, bands * sizeof(double), "irradiance", e);
+	s->irradiance.indirect = mem_new(sides, bands * sizeof(double), "irradiance", e);
 	s->error.sampling = mem_new(es, bands * sizeof(double), "irradiance", e);
 	s->error.sampling_direct = mem_new(es, bands * sizeof(double), "irradiance", e);
 	s->error.discretisation = mem_new(es, bands * sizeof(double), "irradiance", e);
@@ -33,12 +33,13 @@ static int solution_arrays(struct solution *s, const struct model *m,
 	s->unshot.link = mem_new(t->links, 2 * channels * sizeof(double), "unshot flux", e);
 	s->shot = mem_new(t->rows, 2 * channels * sizeof(double), "shot flux", e);
 	s->ledger = mem_new(LEDGER_TERMS, channels * sizeof(double), "ledger", e);
-	return s->irradiance.direct && s->irradiance.caustic && s->irradiance.indirect && s->error.sampling && s->error.sampling_direct &&
-	       s->error.discretisation && s->error.discretisation_direct && s->unshot.emission &&
-	       s->unshot.diffuse && s->unshot.link && s->shot && s->ledger ? 0 : -1;
+	return s->irradiance.direct && s->irradiance.caustic && s->irradiance.indirect &&
+	       s->error.sampling && s->error.sampling_direct && s->error.discretisation &&
+	       s->error.discretisation_direct && s->unshot.emission && s->unshot.diffuse &&
+	       s->unshot.link && s->shot && s->ledger ? 0 : -1;
 }
 
-/* Flux that can be squared, for variances. */
+/* Flux, in the scene's unit: what is larger cannot be squared for variances (DBL_MAX is 1.8e308). */
 static const double brightest = 1e150;
 
 int radiosity_begin(struct solution *s, const struct model *m, const struct transport *t,
@@ -112,15 +113,22 @@ static int finish_round(struct shooter *v, uint64_t last_shot)
 /* Enters what has been read since the last time. */
 static void count_work(struct shooter *v)
 {
-	v->s->round[ROUND_WORK] += (double)(v->sender.runs - v->counted);
-	v->counted = v->sender.runs;
+	v->s->round[ROUND_WORK] += (double)(v->propagator.runs - v->counted);
+	v->counted = v->propagator.runs;
 }
 
-/* Whether shots would go on for longer than overshooting takes, by how much the last
- * sweeps (as many runs as there are) have brought. */
+/* Sweeps, of as many runs as there are, over which the rate of convergence is taken: a guess;
+ * one has to be over before there is any rate. */
+enum { SWEEPS = 2 };
+
+/* Sweeps still to go, by that rate, beyond which overshooting is worth it. GMRES takes a pass
+ * for each digit or so and up to BASIS_MAX of them (gmres.c), each of one sweep: half of these.
+ * A guess; `shoot --log` in a scene of albedos near 1 shows what it does. */
+enum { WORTH = 20 };
+
+/* Whether shots would go on for longer than overshooting takes. */
 static int is_slow(struct shooter *v, double unshot, double stop)
 {
-	enum { SWEEPS = 2, WORTH = 20 };
 	double *round = v->s->round, sweeps = round[ROUND_WORK] / (double)v->t->runs;
 
 	if (v->negative)
@@ -141,7 +149,7 @@ static void tell(const struct shooter *v, const struct radiosity_hooks *hooks,
 
 	if (!hooks || !hooks->step)
 		return;
-	for (size_t c = 0; c < v->sender.channels; c++) {
+	for (size_t c = 0; c < v->propagator.channels; c++) {
 		unshot[c % bands] += ((const double *)v->unshot)[c];
 		emitted[c % bands] += v->s->ledger[c];
 	}
@@ -149,9 +157,10 @@ static void tell(const struct shooter *v, const struct radiosity_hooks *hooks,
 	            unshot, emitted, v->residual });
 }
 
-/* A round goes down to a part of the largest priority. The more rounds, the better the order
- * of shots, but each looks at all links. */
-enum { DEPTH = 32 };
+/* A round goes down to the largest priority over this. The more rounds, the better the order of
+ * shots, but each looks at all links. A guess; the report's `passes` and seconds of `shoot` show
+ * what it does. */
+enum { ROUND_DEPTH = 32 };
 
 /* Rounds, or overshooting where they are slow, until `stop` or the last shot. */
 static int rounds(struct shooter *v, const struct radiosity_options *o,
@@ -170,7 +179,7 @@ static int rounds(struct shooter *v, const struct radiosity_options *o,
 			go_on = radiosity_gmres_finish(v, r->unshot, o->stop, e);
 		} else {
 			if (s->round[ROUND_LEAST] == 0)
-				s->round[ROUND_LEAST] = top / DEPTH;
+				s->round[ROUND_LEAST] = top / ROUND_DEPTH;
 			go_on = finish_round(v, last);
 		}
 		top = radiosity_survey(v, &r->unshot);
@@ -178,7 +187,7 @@ static int rounds(struct shooter *v, const struct radiosity_options *o,
 		r->rounds++;
 		tell(v, hooks, r);
 	}
-	radiosity_propagator_store(&v->sender, s);
+	radiosity_propagator_store(&v->propagator, s);
 	return go_on < 0 ? -1 : 0;
 }
 
@@ -187,16 +196,16 @@ static void report(const struct shooter *v, int threads, struct radiosity_report
 	double emitted = 0;
 
 	for (size_t i = 0; i < v->components.n; i++) {
-		double part = 0;
+		double flux = 0;
 		for (size_t g = 0; g < v->s->groups; g++)
-			part += v->emitted[i * v->s->groups + g];
-		r->components += part > 0;
-		emitted += part;
+			flux += v->emitted[i * v->s->groups + g];
+		r->components += flux > 0;
+		emitted += flux;
 	}
 	r->residual = v->residual;
 	r->guessed = v->guessed / emitted;
-	r->passes = v->t->runs ? (double)v->sender.runs / (double)v->t->runs : 0;
-	r->solve_bytes = v->sender.bytes;
+	r->passes = v->t->runs ? (double)v->propagator.runs / (double)v->t->runs : 0;
+	r->solve_bytes = v->propagator.bytes;
 	r->bound = radiosity_truncation_bound(v->t, &v->components, v->s, threads, &r->solve_bytes) / emitted;
 }
 

@@ -1,15 +1,44 @@
-/* The radiosity solution by progressive shooting with memory of direction.
+/* The radiosity solution by progressive shooting with memory of direction: the loop.
  *
- * A shot sends unshot flux of one patch-side: its own emission with what leaves it
- * diffusely, and, source by source, what leaves by the lobes about R and T of the light
- * that arrived on it (the paper's arrays of unshot radiosity, kept only for sources that a
- * directional patch really sees: the links of a .ff file). Shots go in rounds: a round goes
- * through the patch-sides in index order and shoots, of each, what has a priority of at
- * least a part of the largest at its beginning: unshot flux over what is emitted and over
- * the work of sending it. Flux of all bands and light groups goes in one shot.
+ * State (struct solution), in flux, for each channel (band and light group):
+ *   unshot.diffuse[i]   what patch-side i still has to send diffusely: one number, as diffuse
+ *                       light forgets where it came from
+ *   unshot.link[l][o]   what is still to leave directional patch-side j by its lobes about R
+ *                       and T. A link l is a source (a patch-side or light, and the chain of
+ *                       mirrors and panes between) and a side j that it lights: the paper's
+ *                       arrays of unshot radiosity, kept only for sources that j really sees.
+ *                       o: whether the light has met a diffuse surface (FROM_EMITTER or not)
+ *   unshot.emission[i]  what emitter i has not sent yet
+ *   shot[r][o]          what row r of the form factors has sent so far
  *
- * Shots work on flux summed by patch; elements get their irradiance at the end, in
- * one pass over the form factors with the total that each row has sent. */
+ * Order (radiosity.c). Each punctual light sends all it emits. Then rounds:
+ *   priority = sum over channels of |unshot| / emitted(component, group) / cost, where cost is
+ *              how many sums by patch its rows have: the work of sending it
+ *   least    = the largest priority / ROUND_DEPTH
+ *   for each patch-side in index order, if something of it has a priority of at least `least`,
+ *      one shot (radiosity_shoot_side): its emission and diffuse flux if they have it together,
+ *      by the rows F[i -> j]; the flux of each link that has it, rho_s / (rho_s + tau_s) of it
+ *      by the row of the lobe about R and the rest by that about T, eq. (3)
+ *   until unshot / emitted <= stop in each component and group.
+ * Where that is slow, GMRES solves for all that is to be sent, and it is shot at once (gmres.c).
+ *
+ * Flux X that a row lands on side s of a patch, the other side being s' (propagate.c):
+ *   unshot.diffuse[s] += rho_d X    unshot.link[source -> s] += (rho_s + tau_s) X, lobes
+ *   unshot.diffuse[s'] += tau_d X   absorbed += (1 - rho_d - tau_d - rho_s - tau_s) X
+ * Ideal shares go on within the row, by its blocks for longer chains.
+ *
+ * Ledger: these add up to X, and those to what was sent, so after every shot and round
+ *   emitted = absorbed + escaped + lost + cut + sum of all that is unshot
+ * in each channel. radiosity_report.residual is the largest difference, over emitted: rounding
+ * alone. (lost: what lobes of the reciprocal kind do not reflect. cut: chains beyond the bound.)
+ *
+ * Truncation bound (truncation_bound.c): with N(s) how often unit flux arriving on s arrives
+ * again, in the worst way it can leave, what is unshot will still bring at most
+ *   sum over elements of area |H - H*| <= sum over rows of |unshot| sum_j row[j] (1 + N(j))
+ * Where rows have no longer chains this is at most |unshot| / (1 - a), a the largest albedo.
+ *
+ * Shots work on flux summed by patch. Elements get their irradiance at the end, in one pass over
+ * the form factors (element_irradiance.c): H[e] = sum over rows of shot[r] row[r][e] / area[e]. */
 #ifndef TWOPASS_RADIOSITY_H
 #define TWOPASS_RADIOSITY_H
 
@@ -50,7 +79,7 @@ struct radiosity_report {
 	                          unshot flux, over emitted flux; INFINITY = no finite bound */
 	double guessed;        /* flux that used a link of another source, over emitted */
 	double solve_bytes;    /* of form factors read by shots and bound: runs */
-	double gather_bytes;   /* and by the pass over elements: columns and values */
+	double element_bytes;   /* and by the pass over elements: columns and values */
 };
 
 /* Zeroed state for a model and its transport with all emission unshot; light_groups: see
@@ -74,8 +103,8 @@ int radiosity_element_irradiance(struct solution *s, const struct transport *t, 
 
 /* An upper bound of the flux that will still arrive anywhere because of what is unshot;
  * INFINITY if it cannot be bounded. Adds to *bytes what it reads of runs.
- * O(runs x steps), at most 64 steps. */
-double radiosity_truncation_bound(const struct transport *t, const struct components *parts,
+ * O(runs x steps), of which there are at most STEPS_MAX. */
+double radiosity_truncation_bound(const struct transport *t, const struct components *components,
                                   const struct solution *s, int threads, double *bytes);
 
 #endif

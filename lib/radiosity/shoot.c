@@ -10,7 +10,8 @@
 
 /* ---- the beginning and the end ---- */
 
-/* Less is no light: what becomes of it would not have all its digits. */
+/* Flux, in the scene's unit. Less is no light: what becomes of it would not have all its digits
+ * (DBL_MIN is 2e-308). */
 static const double dimmest = 1e-200;
 
 double radiosity_emitted(const struct model *m, uint32_t source, int band)
@@ -29,14 +30,14 @@ double radiosity_emitted(const struct model *m, uint32_t source, int band)
 static void weigh_components(struct shooter *v)
 {
 	const struct solution *s = v->s;
-	size_t bands = (size_t)s->bands, vectors = v->sender.vectors;
+	size_t bands = (size_t)s->bands, vectors = v->propagator.vectors;
 
 	for (uint32_t i = 0; i < s->sources; i++)
 		for (int k = 0; k < s->bands; k++)
 			v->emitted[v->components.of[i] * s->groups + solution_group(s, v->t->m, i)] +=
 				radiosity_emitted(v->t->m, i, k);
 	for (size_t i = 0; i < v->components.n; i++)
-		for (size_t c = 0; c < v->sender.channels; c++) {
+		for (size_t c = 0; c < v->propagator.channels; c++) {
 			double emitted = v->emitted[i * s->groups + c / bands];
 			((double *)(v->weight + i * vectors))[c] = emitted > 0 ? 1 / emitted : 0;
 		}
@@ -44,7 +45,7 @@ static void weigh_components(struct shooter *v)
 
 static double row_cost(const struct transport *t, uint32_t row)
 {
-	/* Runs that a block's head and an account of the shot are worth. */
+	/* Runs that a block's head and an account of the shot are worth in time: a guess. */
 	enum { HEAD = 16 };
 	uint64_t b = t->row_block[row], end = t->row_block[row + 1];
 
@@ -72,18 +73,18 @@ static void set_costs(struct shooter *v)
 
 static int new_arrays(struct shooter *v, struct err *e)
 {
-	size_t parts = v->components.n, vectors = v->sender.vectors, sides = v->s->patch_sides;
+	size_t components = v->components.n, vectors = v->propagator.vectors, sides = v->s->patch_sides;
 
-	v->emitted = mem_new(parts * v->s->groups, sizeof *v->emitted, "priorities", e);
+	v->emitted = mem_new(components * v->s->groups, sizeof *v->emitted, "priorities", e);
 	v->cost = mem_new(sides, sizeof *v->cost, "priorities", e);
 	v->link_cost = mem_new(v->t->links, sizeof *v->link_cost, "priorities", e);
-	v->weight = lanes_new(parts * vectors, &v->room[0], "priorities", e);
+	v->weight = lanes_new(components * vectors, &v->room[0], "priorities", e);
 	v->out = lanes_new(vectors, &v->room[1], "flux", e);
 	v->emission = lanes_new(vectors, &v->room[2], "flux", e);
 	v->diffuse = lanes_new(vectors, &v->room[3], "flux", e);
 	v->unshot = lanes_new(vectors, &v->room[4], "flux", e);
-	v->part = lanes_new(parts * vectors, &v->room[5], "priorities", e);
-	return v->emitted && v->part && v->cost && v->link_cost && v->weight && v->out &&
+	v->component_unshot = lanes_new(components * vectors, &v->room[5], "priorities", e);
+	return v->emitted && v->component_unshot && v->cost && v->link_cost && v->weight && v->out &&
 	       v->emission && v->diffuse && v->unshot ? 0 : -1;
 }
 
@@ -91,8 +92,8 @@ int radiosity_shooter_init(struct shooter *v, struct solution *s, const struct t
                            struct err *e)
 {
 	*v = (struct shooter){ .s = s, .t = t };
-	if (radiosity_propagator_init(&v->sender, t, s->groups, e) || radiosity_propagator_load(&v->sender, s, e) ||
-	    radiosity_shot_ledger_new(&v->sent, v->sender.vectors, e) || radiosity_components_init(&v->components, t, e) ||
+	if (radiosity_propagator_init(&v->propagator, t, s->groups, e) || radiosity_propagator_load(&v->propagator, s, e) ||
+	    radiosity_shot_ledger_new(&v->booked, v->propagator.vectors, e) || radiosity_components_init(&v->components, t, e) ||
 	    new_arrays(v, e))
 		return -1;
 	weigh_components(v);
@@ -107,8 +108,8 @@ void radiosity_shooter_free(struct shooter *v)
 	free(v->emitted);
 	free(v->cost);
 	free(v->link_cost);
-	radiosity_shot_ledger_free(&v->sent);
-	radiosity_propagator_free(&v->sender);
+	radiosity_shot_ledger_free(&v->booked);
+	radiosity_propagator_free(&v->propagator);
 	radiosity_components_free(&v->components);
 }
 
@@ -117,7 +118,7 @@ void radiosity_shooter_free(struct shooter *v)
 static void check_ledger(struct shooter *v)
 {
 	const struct solution *s = v->s;
-	size_t channels = v->sender.channels;
+	size_t channels = v->propagator.channels;
 
 	for (size_t c = 0; c < channels; c++) {
 		double in = s->ledger[c], out = ((const double *)v->unshot)[c];
@@ -128,6 +129,7 @@ static void check_ledger(struct shooter *v)
 	}
 }
 
+/* Vectors: as many sums stay in registers, beside what they are added up from. */
 enum { FEW = 2 };
 
 static inline void raise(double *top, double x)
@@ -144,7 +146,7 @@ static ALWAYS_INLINE double count_as(struct shooter *v, uint32_t source, const l
 	const lanes *weight = v->weight + v->components.of[source] * n;
 	lanes here[2 * FEW] = { 0 }, below = { 0 };
 	lanes *all = few ? here : v->unshot;
-	lanes *part = few ? here + FEW : v->part + v->components.of[source] * n;
+	lanes *part = few ? here + FEW : v->component_unshot + v->components.of[source] * n;
 	double top = 0;
 
 	for (size_t k = 0; k < items; k++, flux += n) {
@@ -160,7 +162,7 @@ static ALWAYS_INLINE double count_as(struct shooter *v, uint32_t source, const l
 	}
 	for (size_t i = 0; few && i < n; i++) {
 		v->unshot[i] += all[i];
-		v->part[v->components.of[source] * n + i] += part[i];
+		v->component_unshot[v->components.of[source] * n + i] += part[i];
 	}
 	v->negative |= lanes_total(&below, 1) > 0;
 	return top;
@@ -169,10 +171,10 @@ static ALWAYS_INLINE double count_as(struct shooter *v, uint32_t source, const l
 static double count(struct shooter *v, uint32_t source, const lanes *flux, size_t items,
                     const double *cost)
 {
-	switch (v->sender.vectors) {
+	switch (v->propagator.vectors) {
 	case 1: return count_as(v, source, flux, items, cost, 1, 1);
 	case FEW: return count_as(v, source, flux, items, cost, FEW, 1);
-	default: return count_as(v, source, flux, items, cost, v->sender.vectors, 0);
+	default: return count_as(v, source, flux, items, cost, v->propagator.vectors, 0);
 	}
 }
 
@@ -184,7 +186,7 @@ static double worst_part(const struct shooter *v)
 
 	for (size_t i = 0; i < v->components.n; i++)
 		for (size_t g = 0; g < v->s->groups; g++) {
-			const double *part = (double *)(v->part + i * v->sender.vectors) + g * bands;
+			const double *part = (double *)(v->component_unshot + i * v->propagator.vectors) + g * bands;
 			double sum = 0;
 			for (size_t k = 0; k < bands; k++)
 				sum += part[k];
@@ -197,7 +199,7 @@ static void load_emission(const struct shooter *v, uint32_t source, lanes *to)
 {
 	size_t bands = (size_t)v->s->bands;
 
-	memset(to, 0, v->sender.vectors * sizeof *to);
+	memset(to, 0, v->propagator.vectors * sizeof *to);
 	memcpy((double *)to + solution_group(v->s, v->t->m, source) * bands,
 	       v->s->unshot.emission + source * bands, bands * sizeof(double));
 }
@@ -214,13 +216,13 @@ static inline double weigh(const lanes *weight, const lanes *flux, size_t n)
 
 static const lanes *weight_of(const struct shooter *v, uint32_t source)
 {
-	return v->weight + v->components.of[source] * v->sender.vectors;
+	return v->weight + v->components.of[source] * v->propagator.vectors;
 }
 
 /* What a side emits and has to send diffusely, by weight. */
 static double weigh_own(const struct shooter *v, uint32_t ps)
 {
-	const size_t bands = (size_t)v->s->bands, n = v->sender.vectors;
+	const size_t bands = (size_t)v->s->bands, n = v->propagator.vectors;
 	const double *emission = v->s->unshot.emission + ps * bands;
 	const double *weight = (const double *)weight_of(v, ps);
 	double flux = 0;
@@ -228,18 +230,18 @@ static double weigh_own(const struct shooter *v, uint32_t ps)
 	for (size_t k = 0; k < bands; k++)
 		flux += emission[k];
 	return flux * weight[solution_group(v->s, v->t->m, ps) * bands] +
-	       weigh(weight_of(v, ps), v->sender.unshot_diffuse + ps * n, n);
+	       weigh(weight_of(v, ps), v->propagator.unshot_diffuse + ps * n, n);
 }
 
 double radiosity_survey(struct shooter *v, double *worst)
 {
 	const struct transport *t = v->t;
-	struct propagator *s = &v->sender;
+	struct propagator *s = &v->propagator;
 	size_t vectors = s->vectors;
 	double top = 0;
 
 	memset(v->unshot, 0, vectors * sizeof *v->unshot);
-	memset(v->part, 0, v->components.n * vectors * sizeof *v->part);
+	memset(v->component_unshot, 0, v->components.n * vectors * sizeof *v->component_unshot);
 	v->negative = 0;
 	for (uint32_t i = 0; i < v->s->sources; i++) {
 		const int is_light = i >= v->s->patch_sides;
@@ -272,13 +274,13 @@ static int own_is_due(const struct shooter *v, uint32_t ps, double least)
 	return reaches(weigh_own(v, ps), v->cost[ps], least);
 }
 
-/* The first link of a side from l on that is due, by link and freshness; or where its
+/* The first link of a side from l on that is due, by link and origin; or where its
  * links end. */
 static uint64_t next_link(const struct shooter *v, uint32_t ps, uint64_t l, double least)
 {
-	const size_t n = v->sender.vectors;
+	const size_t n = v->propagator.vectors;
 	const uint64_t end = 2 * v->t->target_link[ps + 1];
-	const lanes *weight = weight_of(v, ps), *flux = v->sender.unshot_link + l * n;
+	const lanes *weight = weight_of(v, ps), *flux = v->propagator.unshot_link + l * n;
 
 	for (; l < end; l++, flux += n)
 		if (reaches(n == 1 ? weigh(weight, flux, 1) : weigh(weight, flux, n),
@@ -296,21 +298,21 @@ int radiosity_is_due(const struct shooter *v, uint32_t ps, double least)
 /* ---- shots ---- */
 
 /* Sends flux by a row, scaled by channel if `share` is given. */
-static void shoot_row(struct shooter *v, uint32_t row, int freshness, const lanes *from,
+static void shoot_row(struct shooter *v, uint32_t row, int origin, const lanes *from,
                       const lanes *share, double *shot)
 {
 	lanes flux[VECTORS_MAX];
-	size_t vectors = v->sender.vectors, channels = v->sender.channels;
+	size_t vectors = v->propagator.vectors, channels = v->propagator.channels;
 
 	for (size_t i = 0; i < vectors; i++)
 		flux[i] = share ? from[i] * share[i] : from[i];
 	if (!(lanes_magnitude(flux, vectors) > 0))
 		return;
 	if (shot)
-		shot += (2 * (size_t)row + (size_t)freshness) * channels;
+		shot += (2 * (size_t)row + (size_t)origin) * channels;
 	for (size_t c = 0; shot && c < channels; c++)
 		shot[c] += ((const double *)flux)[c];
-	radiosity_propagate_row(&v->sender, row, freshness, flux, &v->sent);
+	radiosity_propagate_row(&v->propagator, row, origin, flux, &v->booked);
 }
 
 void radiosity_shoot_diffuse(struct shooter *v, uint32_t ps, const lanes *flux, double *shot)
@@ -322,12 +324,12 @@ void radiosity_shoot_diffuse(struct shooter *v, uint32_t ps, const lanes *flux, 
 void radiosity_shoot_link(struct shooter *v, uint64_t l, const lanes *flux, double *shot)
 {
 	const struct transport *t = v->t;
-	const lanes *share = radiosity_propagator_share(&v->sender, t->link_target[l >> 1]);
+	const lanes *share = radiosity_propagator_share(&v->propagator, t->link_target[l >> 1]);
 
 	for (uint64_t way = 0; way < 2; way++) {
 		uint32_t row = t->link_row[(l & ~(uint64_t)1) + way];
 		if (row != FF_NO_ROW)
-			shoot_row(v, row, (int)(l & 1), flux, share + way * v->sender.vectors, shot);
+			shoot_row(v, row, (int)(l & 1), flux, share + way * v->propagator.vectors, shot);
 	}
 }
 
@@ -349,17 +351,17 @@ static void fetch_link(const struct shooter *v, uint32_t ps, uint64_t l, int ahe
 
 	for (int way = 0; l < 2 * v->t->target_link[ps + 1] && way < 2; way++)
 		if (row[way] != FF_NO_ROW)
-			radiosity_propagate_fetch(&v->sender, row[way], (int)(l & 1), ahead);
+			radiosity_propagate_fetch(&v->propagator, row[way], (int)(l & 1), ahead);
 }
 
-/* Links are short, so that reading them is waiting for memory: each is looked for three
- * ahead. Whether there were any. */
+/* Links are short, so that reading them is waiting for memory: each is looked for AHEAD before,
+ * one for each step of radiosity_propagate_fetch. Whether there were any. */
 static int shoot_links(struct shooter *v, uint32_t ps, double least)
 {
 	enum { AHEAD = 3 };
 	const struct transport *t = v->t;
 	const uint64_t end = 2 * t->target_link[ps + 1];
-	size_t vectors = v->sender.vectors;
+	size_t vectors = v->propagator.vectors;
 	lanes now[VECTORS_MAX];
 	uint64_t l[AHEAD + 1] = { next_link(v, ps, 2 * t->target_link[ps], least) };
 
@@ -370,7 +372,7 @@ static int shoot_links(struct shooter *v, uint32_t ps, double least)
 	while (l[0] < end) {
 		for (int k = AHEAD; k > 0; k--)
 			fetch_link(v, ps, l[k], k);
-		take(v->sender.unshot_link + l[0] * vectors, now, v->out, vectors);
+		take(v->propagator.unshot_link + l[0] * vectors, now, v->out, vectors);
 		radiosity_shoot_link(v, l[0], now, v->s->shot);
 		memmove(l, l + 1, AHEAD * sizeof *l);
 		if (l[AHEAD] < end)
@@ -382,11 +384,11 @@ static int shoot_links(struct shooter *v, uint32_t ps, double least)
 void radiosity_book(struct shooter *v, const lanes *out)
 {
 	struct solution *s = v->s;
-	size_t channels = v->sender.channels;
-	const double *absorbed = (const double *)v->sent.absorbed;
-	const double *escaped = (const double *)v->sent.escaped;
-	const double *lost = (const double *)v->sent.lost, *cut = (const double *)v->sent.cut;
-	const double *kept = (const double *)v->sent.kept, *taken = (const double *)out;
+	size_t channels = v->propagator.channels;
+	const double *absorbed = (const double *)v->booked.absorbed;
+	const double *escaped = (const double *)v->booked.escaped;
+	const double *lost = (const double *)v->booked.lost, *cut = (const double *)v->booked.cut;
+	const double *kept = (const double *)v->booked.kept, *taken = (const double *)out;
 
 	for (size_t c = 0; c < channels; c++) {
 		double gone = absorbed[c] + escaped[c] + lost[c] + cut[c];
@@ -394,12 +396,12 @@ void radiosity_book(struct shooter *v, const lanes *out)
 		s->ledger[LEDGER_ESCAPED * channels + c] += escaped[c];
 		s->ledger[LEDGER_LOST * channels + c] += lost[c];
 		s->ledger[LEDGER_CUT * channels + c] += cut[c];
-		v->guessed += ((const double *)v->sent.guessed)[c];
+		v->guessed += ((const double *)v->booked.guessed)[c];
 		if (taken && s->ledger[c] > 0)
 			v->residual = fmax(v->residual,
 			                   fabs(taken[c] - gone - kept[c]) / s->ledger[c]);
 	}
-	radiosity_shot_ledger_clear(&v->sent);
+	radiosity_shot_ledger_clear(&v->booked);
 }
 
 static void take_emission(struct shooter *v, uint32_t source)
@@ -408,18 +410,18 @@ static void take_emission(struct shooter *v, uint32_t source)
 
 	load_emission(v, source, v->emission);
 	memset(v->s->unshot.emission + source * bands, 0, bands * sizeof(double));
-	for (size_t i = 0; i < v->sender.vectors; i++)
+	for (size_t i = 0; i < v->propagator.vectors; i++)
 		v->out[i] += v->emission[i];
 }
 
 static void shoot_own(struct shooter *v, uint32_t ps)
 {
 	const struct transport *t = v->t;
-	size_t vectors = v->sender.vectors;
+	size_t vectors = v->propagator.vectors;
 	uint32_t row = t->emission_row[ps] != FF_NO_ROW ? t->emission_row[ps] : t->diffuse_row[ps];
 
 	take_emission(v, ps);
-	take(v->sender.unshot_diffuse + ps * vectors, v->diffuse, v->out, vectors);
+	take(v->propagator.unshot_diffuse + ps * vectors, v->diffuse, v->out, vectors);
 	if (row != FF_NO_ROW)
 		shoot_row(v, row, FROM_EMITTER, v->emission, NULL, v->s->shot);
 	radiosity_shoot_diffuse(v, ps, v->diffuse, v->s->shot);
@@ -429,7 +431,7 @@ void radiosity_shoot_side(struct shooter *v, uint32_t ps, double least)
 {
 	const int own = own_is_due(v, ps, least);
 
-	memset(v->out, 0, v->sender.vectors * sizeof *v->out);
+	memset(v->out, 0, v->propagator.vectors * sizeof *v->out);
 	if (own)
 		shoot_own(v, ps);
 	if (!shoot_links(v, ps, least) && !own)
@@ -440,7 +442,7 @@ void radiosity_shoot_side(struct shooter *v, uint32_t ps, double least)
 
 void radiosity_shoot_light(struct shooter *v, uint32_t source)
 {
-	memset(v->out, 0, v->sender.vectors * sizeof *v->out);
+	memset(v->out, 0, v->propagator.vectors * sizeof *v->out);
 	take_emission(v, source);
 	shoot_row(v, v->t->light_row[source - v->s->patch_sides], FROM_EMITTER, v->emission, NULL,
 	          v->s->shot);

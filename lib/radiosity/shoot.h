@@ -1,4 +1,5 @@
-/* The state of the solver at work, and shots (private to the solver).
+/* The state of shooting at work, and single shots (private to lib/radiosity). The loop that
+ * calls them is stated in radiosity.h.
  *
  * Unshot flux may be negative after overshooting; shots take it as it comes. */
 #ifndef TWOPASS_SHOOT_H
@@ -11,9 +12,9 @@
 struct shooter {
 	struct solution *s;
 	const struct transport *t;
-	struct propagator sender;
+	struct propagator propagator;
 	struct components components;
-	struct shot_ledger sent;        /* what became of the shot in work */
+	struct shot_ledger booked;      /* what became of the shot in work */
 	lanes *out;              /* [vectors] what it took away */
 	lanes *emission;         /* [vectors] of that, what was emission */
 	lanes *diffuse;          /* [vectors] and what was to leave diffusely */
@@ -21,10 +22,10 @@ struct shooter {
 	lanes *weight;           /* [components][vectors] 1 / emitted, by group */
 	double *cost;            /* [2P] of sending what leaves a side diffusely, in runs */
 	double *link_cost;       /* [links] of sending what leaves by lobes */
-	lanes *part;             /* [components][vectors] unshot flux by weight */
+	lanes *component_unshot; /* [components][vectors] unshot flux by weight */
 	lanes *unshot;           /* [vectors] in all, then */
 	int negative;            /* some of it is below 0 */
-	uint64_t counted;        /* sender.runs that round[ROUND_WORK] has */
+	uint64_t counted;        /* propagator.runs that round[ROUND_WORK] has */
 	double guessed, residual;
 	void *room[6];           /* memory of the vectors */
 };
@@ -43,7 +44,7 @@ double radiosity_emitted(const struct model *m, uint32_t source, int band);
 double radiosity_survey(struct shooter *v, double *worst);
 
 /* Whether a patch-side has anything of that priority: what it emits and what is to leave
- * diffusely, or what is to leave by the lobes of a link, fresh or mixed. */
+ * diffusely, or what is to leave by the lobes of a link, of either origin. */
 int radiosity_is_due(const struct shooter *v, uint32_t ps, double least);
 
 /* A shot of what has that priority, if anything; one of all of a light. */
@@ -51,12 +52,12 @@ void radiosity_shoot_side(struct shooter *v, uint32_t ps, double least);
 void radiosity_shoot_light(struct shooter *v, uint32_t source);
 
 /* Sends flux to leave diffusely by a side, or by the lobes of link index l (2 link +
- * freshness), without taking it from anywhere; adds to v->sent and to `shot`, which may
+ * origin), without taking it from anywhere; adds to v->booked and to `shot`, which may
  * be NULL. */
 void radiosity_shoot_diffuse(struct shooter *v, uint32_t ps, const lanes *flux, double *shot);
 void radiosity_shoot_link(struct shooter *v, uint64_t l, const lanes *flux, double *shot);
 
-/* Books v->sent in the ledger, where `out` was taken from unshot flux; NULL if that is
+/* Enters v->booked in the ledger, where `out` was taken from unshot flux; NULL if that is
  * accounted for (propagate_exact.h). */
 void radiosity_book(struct shooter *v, const lanes *out);
 

@@ -8,6 +8,9 @@
 #include "lib/radiosity/transport_links.h"
 #include "lib/scatter/bsdf.h"
 
+/* Rows that a thread takes at a time: they differ much in length. A guess. */
+enum { ROWS_AT_A_TIME = 64 };
+
 static const char what[] = "form factors by patch";
 
 struct pass {
@@ -291,7 +294,7 @@ static int runs_of(struct pass *p, int threads, struct err *e)
 	const size_t each = threads > 1 ? (size_t)threads : 1;
 
 	set_kinds(p);
-	par_for(t->rows, 64, threads, count_rows, p, NULL);
+	par_for(t->rows, ROWS_AT_A_TIME, threads, count_rows, p, NULL);
 	number_runs(t);
 	t->run_target = mem_new(t->runs, sizeof *t->run_target, what, e);
 	t->run_sum = mem_new(t->runs, sizeof *t->run_sum, what, e);
@@ -299,7 +302,7 @@ static int runs_of(struct pass *p, int threads, struct err *e)
 	if (!t->run_target || !t->run_sum || !t->run_link)
 		return -1;
 	memset(p->has, 0, each * t->chains.n * sizeof *p->has);
-	par_for(t->rows, 64, threads, fill_rows, p, NULL);
+	par_for(t->rows, ROWS_AT_A_TIME, threads, fill_rows, p, NULL);
 	return list_onward(t, e);
 }
 

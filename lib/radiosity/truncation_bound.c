@@ -20,15 +20,21 @@
 #include "lib/radiosity/radiosity.h"
 #include "lib/scatter/bsdf.h"
 
-enum { STEPS = 64 };
+/* Passes over all runs at most: where 64 do not make the bound tight, albedos are near 1 and it
+ * is not worth more time than shooting took. A guess. */
+enum { STEPS_MAX = 64 };
 
-/* What is not proved to be smaller than this part of the bound is worth a step more. */
+/* A part of the bound: a remainder of more than that, not summed but bounded, is worth a step
+ * more. It is how far the bound may be above what it bounds, roughly; a guess. */
 static const double loose = .15;
+
+/* Rows that a thread takes at a time: they differ much in length. A guess. */
+enum { ROWS_AT_A_TIME = 64 };
 
 struct bound {
 	const struct transport *t;
 	size_t bands, vectors;
-	const struct components *parts;
+	const struct components *components;
 	double *in;           /* [blocks][bands] flux by each block of unit flux, over its sum */
 	double *row;          /* [rows][bands] what a row makes of D, or of 1 + N */
 	lanes *d;             /* [2][2P][vectors] D: of all reflections, of all but lobes */
@@ -38,7 +44,7 @@ struct bound {
 	double bytes;         /* of runs read */
 };
 
-static void unit_rows(struct bound *x, struct propagator *sender)
+static void unit_rows(struct bound *x, struct propagator *propagator)
 {
 	const struct transport *t = x->t;
 	double one[BANDS_MAX];
@@ -47,7 +53,7 @@ static void unit_rows(struct bound *x, struct propagator *sender)
 		one[k] = 1;
 	for (uint32_t r = 0; r < t->rows; r++) {
 		double *in = x->in + t->row_block[r] * x->bands;
-		radiosity_propagate_block_flux(sender, r, one, in);
+		radiosity_propagate_block_flux(propagator, r, one, in);
 		for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
 			for (size_t k = 0; k < x->bands; k++)
 				*in++ /= t->block[b].sum > 0 ? t->block[b].sum : 1;
@@ -114,7 +120,7 @@ static void all_rows(struct bound *x, const lanes *of, int threads)
 {
 	struct rows_job j = { x, of };
 
-	par_for(x->t->rows, 64, threads, rows_step, &j, NULL);
+	par_for(x->t->rows, ROWS_AT_A_TIME, threads, rows_step, &j, NULL);
 	x->bytes += (double)(x->t->runs * x->vectors) *
 	            (sizeof *x->t->run_target + sizeof *x->t->run_sum);
 }
@@ -144,12 +150,12 @@ static void sides_step(struct bound *x)
 {
 	const struct model *m = x->t->m;
 
-	memset(x->ratio, 0, x->parts->n * x->bands * sizeof *x->ratio);
+	memset(x->ratio, 0, x->components->n * x->bands * sizeof *x->ratio);
 	for (size_t i = 0; i < 4 * m->patch.n; i++) {
 		uint32_t ps = (uint32_t)(i % (2 * m->patch.n));
 		double *d = (double *)(x->d + i * x->vectors);
 		double *n = (double *)(x->n + i * x->vectors);
-		double *ratio = x->ratio + x->parts->of[ps] * x->bands;
+		double *ratio = x->ratio + x->components->of[ps] * x->bands;
 		for (size_t k = 0; k < x->bands; k++) {
 			double next = model_side_modelled(m, ps)
 			            ? side_step(x, ps, i < 2 * m->patch.n, k) : 0;
@@ -171,7 +177,7 @@ static double remainder_of(struct bound *x, int add)
 		for (size_t k = 0; k < x->bands; k++) {
 			double d = ((double *)(x->d + i * x->vectors))[k];
 			double *n = (double *)(x->n + i * x->vectors) + k;
-			double q = x->ratio[x->parts->of[i % (2 * x->t->m->patch.n)] * x->bands + k];
+			double q = x->ratio[x->components->of[i % (2 * x->t->m->patch.n)] * x->bands + k];
 			if (x->dark[k])
 				continue;
 			double rest = !(d > 0) ? 0 : q < 1 ? d * q / (1 - q) : INFINITY;
@@ -186,17 +192,20 @@ static double remainder_of(struct bound *x, int add)
 static int arrivals(struct bound *x, int threads)
 {
 	const size_t all = 4 * x->t->m->patch.n * x->vectors;
+	/* A remainder that a step brings down by less than 2 percent, after some for the start, is
+	 * a geometric series: the bound is as sharp as it will get. Guesses. */
+	enum { FIRST_STEPS = 8 };
+	const double stuck = .98;
 	double rest = INFINITY, before;
 
 	for (size_t i = 0; i < all; i++)
 		x->d[i] = (lanes){ 1, 1, 1, 1 };
-	for (int k = 0; k < STEPS && rest > loose; k++) {
+	for (int k = 0; k < STEPS_MAX && rest > loose; k++) {
 		all_rows(x, x->d, threads);
 		sides_step(x);
 		before = rest;
 		rest = remainder_of(x, 0);
-		/* A geometric series: the bound is as sharp as it will get. */
-		if (isfinite(rest) && rest > .98 * before && k > 8)
+		if (isfinite(rest) && rest > stuck * before && k > FIRST_STEPS)
 			break;
 	}
 	if (!isfinite(remainder_of(x, 1)))
@@ -256,24 +265,24 @@ static void find_dark(struct bound *x, const struct solution *s)
 				x->dark[i % x->bands] = 0;
 }
 
-double radiosity_truncation_bound(const struct transport *t, const struct components *parts,
+double radiosity_truncation_bound(const struct transport *t, const struct components *components,
                                   const struct solution *s, int threads, double *bytes)
 {
 	struct err e = { 0 };
-	struct propagator sender;
+	struct propagator propagator;
 	size_t bands = (size_t)t->m->bands;
 	struct bound x = { .t = t, .bands = bands, .vectors = lanes_vectors(bands),
-	                  .parts = parts };
+	                  .components = components };
 	void *room[2];
 	double bound = INFINITY;
 
 	x.in = mem_new(t->blocks, bands * sizeof(double), "bound", &e);
 	x.row = mem_new(t->rows, bands * sizeof(double), "bound", &e);
-	x.ratio = mem_new(parts->n, bands * sizeof *x.ratio, "bound", &e);
+	x.ratio = mem_new(components->n, bands * sizeof *x.ratio, "bound", &e);
 	x.d = lanes_new(4 * t->m->patch.n * x.vectors, &room[0], "bound", &e);
 	x.n = lanes_new(4 * t->m->patch.n * x.vectors, &room[1], "bound", &e);
-	if (radiosity_propagator_init(&sender, t, 1, &e) == 0 && x.in && x.row && x.ratio && x.d && x.n) {
-		unit_rows(&x, &sender);
+	if (radiosity_propagator_init(&propagator, t, 1, &e) == 0 && x.in && x.row && x.ratio && x.d && x.n) {
+		unit_rows(&x, &propagator);
 		find_dark(&x, s);
 		if (arrivals(&x, threads)) {
 			all_rows(&x, x.n, threads);
@@ -281,7 +290,7 @@ double radiosity_truncation_bound(const struct transport *t, const struct compon
 		}
 		*bytes += x.bytes;
 	}
-	radiosity_propagator_free(&sender);
+	radiosity_propagator_free(&propagator);
 	free(x.in);
 	free(x.row);
 	free(x.ratio);

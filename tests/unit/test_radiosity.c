@@ -397,7 +397,7 @@ static void overshooting(double exponent, int bands)
 		radiosity_survey(&v, &worst);
 		assert_that(worst, <=, 1e-12);
 		assert_that(v.residual, <=, 1e-13);
-		radiosity_propagator_store(&v.sender, &x.s);
+		radiosity_propagator_store(&v.propagator, &x.s);
 		radiosity_shooter_free(&v);
 		solved_gather(&x);
 		s[k] = x.s;

@@ -135,7 +135,7 @@ static void rate_text(double rate, char *text, size_t size)
 
 static void draw_bar(struct cli_progress *p, double part, const char *rate, const char *left)
 {
-	enum { WIDTH = 24 };
+	enum { WIDTH = 24 }; /* characters: a line of 80 holds the rest, too */
 	char bar[WIDTH + 1];
 
 	for (int i = 0; i < WIDTH; i++)
@@ -151,7 +151,7 @@ static void show_progress(void *arg, double done, double total)
 {
 	struct cli_progress *p = arg;
 	double now = cli_seconds(), spent = now - p->begun;
-	double interval = p->drawn >= 0 ? .1 : 10;
+	double interval = p->drawn >= 0 ? .1 : 10; /* seconds: smooth to look at, or a few lines */
 	char rate[32], left[32];
 
 	/* drawn < 0: no terminal. */

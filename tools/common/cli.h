@@ -8,7 +8,6 @@
 #include "lib/base/parallel.h"
 #include "tools/common/options.h"
 
-
 struct cli {
 	const char *program;
 	const char *synopsis;  /* after the program's name */
@@ -18,7 +17,7 @@ struct cli {
 	int keeps_output;      /* has --any-version: leaves alone what is up to date */
 	/* what options_parse found */
 	int quiet, verbose, help, version, any_version;
-	int threads;           /* all processors unless -j says otherwise */
+	int threads;           /* as -j says, else one for each processor (par_cpus) */
 	uint64_t given;        /* bit i: options[i] was there */
 	int argc;
 	char **argv;

@@ -391,7 +391,7 @@ static void take_vector(const struct cli *c, const struct option_spec *o, const 
 static void take_ratio(const struct cli *c, const struct option_spec *o, const char *text,
                        void *field)
 {
-	enum { MOST = 1000000 };
+	enum { MOST = 1000000 }; /* shards; more is a typing error */
 	uint32_t *r = field;
 	unsigned k, n;
 	char extra;
@@ -418,7 +418,7 @@ struct getopt_tables {
 	char letters[2 + 2 * OPTIONS_MAX];
 	struct option longs[OPTIONS_MAX + 1];
 };
-enum { LONG = 256 };
+enum { LONG = 256 }; /* beyond all letters */
 
 static void getopt_tables(const struct options *all, struct getopt_tables *t)
 {
