@@ -42,8 +42,9 @@ def missing(document, files, words, structs):
         struct = re.fullmatch(r"struct (\w+)", quoted)
         if struct and struct[1] not in structs:
             yield quoted
-        elif FILE.fullmatch(quoted) and "NAME" not in quoted and not is_there(quoted, document, files):
-            yield quoted
+        elif FILE.fullmatch(quoted) and not is_there(quoted, document, files):
+            if not re.search("[A-Z]{4}", quoted):
+                yield quoted
         elif NAME.fullmatch(quoted) and quoted not in words:
             yield quoted
 
@@ -52,7 +53,7 @@ def main():
     tap = Tap()
     paths = list(sources())
     files = {os.path.basename(path) for path in paths} | set(os.listdir(os.path.join(TOP, "man")))
-    words, structs = set(), set()
+    words, structs = {name.partition(".")[0] for name in files}, set()
     for path in paths + [os.path.join(TOP, "Makefile")]:
         if re.search(r"\.(c|h|cc|py|t|pl|sh|mk)$|Makefile$", path):
             with open(path, encoding="utf-8") as f:
