@@ -41,7 +41,8 @@ PROGRAMS := $(TOOLS:%=$(BUILD)/%)
 LIB_OBJS := $(patsubst %.c,$(BUILD)/%.o,$(wildcard lib/*/*.c formats/*/*.c)) \
 	$(patsubst %.cc,$(BUILD)/%.o,$(wildcard formats/*/*.cc))
 CLI_OBJS := $(patsubst %.c,$(BUILD)/%.o,$(wildcard tools/common/*.c))
-UNIT_TESTS := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.c))
+UNIT_SOURCES := $(wildcard tests/unit/test_*.c tests/unit/*/test_*.c)
+UNIT_TESTS := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(UNIT_SOURCES)))
 BENCHES := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(wildcard tests/bench/*.c))
 
 all: $(PROGRAMS) $(BUILD)/libcommon.a
@@ -69,9 +70,10 @@ $(BUILD)/code/%.c: $(BUILD)/tools/%.o $(BUILD)/libcli.a $(BUILD)/libcommon.a too
 $(BUILD)/code/%.o: $(BUILD)/code/%.c
 	$(CC) $(CPPFLAGS) $(CFLAGS) -c -o $@ $<
 
-$(UNIT_TESTS): $(BUILD)/tests/%: $(BUILD)/tests/unit/%.o $(BUILD)/libcommon.a
+$(foreach c,$(UNIT_SOURCES),$(eval $(BUILD)/tests/$(basename $(notdir $c)): $(BUILD)/$(c:.c=.o)))
+$(UNIT_TESTS): $(BUILD)/libcommon.a
 	@mkdir -p $(@D)
-	$(CC) $(LDFLAGS) -o $@ $^ $(LDLIBS) -lcmocka
+	$(CC) $(LDFLAGS) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LDLIBS) -lcmocka
 
 $(BENCHES): $(BUILD)/bench/%: $(BUILD)/tests/bench/%.o $(BUILD)/libcommon.a
 	@mkdir -p $(@D)
