@@ -37,12 +37,20 @@ for name, count in collections.Counter(os.path.basename(f) for f in files).items
     if count > 1:
         bad.append(f"{name}: {count} files of this name")
 
+def is_private(header):
+    """Its first comment says so, with the name of its folder."""
+    head = open(header).read().partition("*/")[0]
+    return re.search(r"private\s(\* )?to " + os.path.dirname(header) + r"\b", head)
+
+
 for path in sorted(glob.glob("lib/*/*.[ch]") + glob.glob("formats/*/*.*") + glob.glob("tools/**/*.[ch]", recursive=True)):
     folder = os.path.dirname(path)
     text = open(path).read()
     may = {f if "/" in f else "lib/" + f for f in LAYERS.get(folder, "").split()} | {folder}
     for line, code in enumerate(text.split("\n"), 1):
         m = re.match(r'#include "((?:lib|formats|tools)/[^"]*)/[^/"]+"', code)
+        if m and m[1] != folder and is_private(code.split('"')[1]):
+            bad.append(f"{path}:{line}: that header is private to {m[1]}")
         if m and not folder.startswith("tools") and m[1] not in may:
             bad.append(f"{path}:{line}: {folder} must not include {m[1]}")
         if folder.startswith("lib") and path.endswith(".c") and re.search(FILES, code):
