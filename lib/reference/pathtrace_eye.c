@@ -14,8 +14,8 @@ enum {
 	PASSES_MAX = 4096,  /* surfaces in a row that a straight ray may pass: more than any scene
 	                       has, so that rounding cannot hold a path for ever */
 	LIGHTS_ALL = 16,    /* lights and images that are all looked at */
-	BATCHES = 8         /* of a pixel's samples, for its standard error, known then to 27 %;
-	                       each is stratified by itself, so fewer are less noisy and less known */
+	BATCHES = 8         /* of a pixel's samples, for its standard error, then known to 27 %;
+	                       each is stratified by itself, so fewer are less noisy, less known */
 };
 
 /* Work for a thread at a time, pixels. */

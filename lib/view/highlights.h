@@ -1,4 +1,4 @@
-/* Highlights of punctual lights (private to the view). */
+/* Highlights of punctual lights (private to lib/view). */
 #ifndef TWOPASS_HIGHLIGHTS_H
 #define TWOPASS_HIGHLIGHTS_H
 
