@@ -177,7 +177,7 @@ bench-form-factors: all $(BUILD)/bench/rays
 
 format:
 	clang-format -i $(wildcard lib/*/*.[ch] formats/*/*.[ch] formats/*/*.cc tools/*.c tools/common/*.[ch] \
-		tests/unit/*.c tests/unit/fixtures/*.h tests/bench/*.c)
+		tests/unit/*.c tests/unit/fixtures/*.h tests/install/*.c tests/bench/*.c)
 
 # For clangd and its like.
 compile_commands.json: Makefile
