@@ -14,6 +14,7 @@
 #include "lib/interpolate/discretisation.h"
 #include "lib/radiosity/light_groups.h"
 #include "lib/radiosity/radiosity.h"
+#include "lib/radiosity/transport.h"
 #include "tools/common/cli.h"
 #include "tools/common/key.h"
 

@@ -8,6 +8,7 @@
 #include "lib/base/channels.h"
 #include "lib/base/mem.h"
 #include "lib/data/punctual.h"
+#include "lib/data/solution.h"
 #include "lib/scatter/bsdf.h"
 
 /* ---- who is in which ---- */

@@ -7,6 +7,7 @@
 #include "lib/base/mem.h"
 #include "lib/radiosity/light_groups.h"
 #include "lib/radiosity/shoot.h"
+#include "lib/radiosity/truncation_bound.h"
 
 /* ---- the beginning ---- */
 

@@ -11,13 +11,16 @@
  *
  * Where a row itself follows what a side's lobes send on, its later blocks count that: the
  * side then counts with what its other reflections do. So N and D have two values a side. */
+#include "lib/radiosity/truncation_bound.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "lib/base/channels.h"
 #include "lib/base/mem.h"
+#include "lib/base/parallel.h"
 #include "lib/radiosity/propagate.h"
-#include "lib/radiosity/radiosity.h"
 #include "lib/scatter/bsdf.h"
 
 /* Passes over all runs at most: where 64 do not make the bound tight, albedos are near 1 and it
