@@ -58,7 +58,8 @@ static const struct option_spec options[] = {
 	  INTEGER(ff.depth, 0, 1000000) },
 	{ 0, "precision", "TYPE", "f32 or f64 (default %s)", WORD(ff.f64, precisions) },
 	{ 0, "part", "K/N", "compute the K-th of N shards only", RATIO(shard) },
-	{ 0, "seed", "N", "seed of the sample points (default %s)", INTEGER(ff.seed, 0, INT64_MAX) },
+	{ 0, "seed", "N", "seed of the sample points (default %s)", 
+	  INTEGER(ff.seed, 0, INT64_MAX) },
 	{ 0 }
 };
 
@@ -145,7 +146,8 @@ static void print_report(const struct ff_stats *s, const struct request *r, doub
 	fprintf(out, "entries       %zu in %zu blocks\n", s->entries, s->blocks);
 	fprintf(out, "rays          %.0f (%.2f Mray/s)\n", s->rays, s->rays / seconds * 1e-6);
 	if (r->ff.method == FF_HEMICUBE)
-		fprintf(out, "pixels        %.0f (%.2f Mpixel/s)\n", s->samples, s->samples / seconds * 1e-6);
+		fprintf(out, "pixels        %.0f (%.2f Mpixel/s)\n", s->samples,
+		        s->samples / seconds * 1e-6);
 	if (s->pairs[0] + s->pairs[1] + s->pairs[2] + s->pairs[3] > 0)
 		fprintf(out, "pairs         %.0f clear, %.0f hidden, %.0f partly (%.1f evaluations each), "
 		        "%.0f sampled\n", s->pairs[0], s->pairs[1], s->pairs[2],
@@ -218,7 +220,8 @@ static int run(struct cli *c, const struct request *r, struct err *e)
 
 	if (!bad) {
 		make_key(c, r, &mesh, key);
-		enum key_fit fit = file_cache_up_to_date(r->output, "twopass.ff", key, c->any_version);
+		enum key_fit fit = file_cache_up_to_date(r->output, "twopass.ff", key,
+		                                         c->any_version);
 		if (fit) {
 			bad = keep(c, r, &m, fit, e);
 		} else {

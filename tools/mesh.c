@@ -81,8 +81,9 @@ static void settle(struct cli *c, int operand, struct request *r)
 		cli_usage(c, "one glTF file is needed");
 	if (!r->output)
 		cli_usage(c, "an output is needed: -o FILE.mesh");
-	if (!r->solution && (options_given(c, "refine-error") || options_given(c, "refine-smallest") ||
-	                     options_given(c, "refine-elements")))
+	if (!r->solution &&
+	    (options_given(c, "refine-error") || options_given(c, "refine-smallest") ||
+	     options_given(c, "refine-elements")))
 		cli_usage(c, "--refine-error, -smallest and -elements need --refine FILE.rad");
 	r->scene = c->argv[operand];
 	cli_keep_input(c, r->output, r->scene);

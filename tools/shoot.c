@@ -14,6 +14,7 @@
 #include "lib/interpolate/discretisation.h"
 #include "lib/radiosity/light_groups.h"
 #include "lib/radiosity/radiosity.h"
+#include "lib/radiosity/transport.h"
 #include "tools/common/cli.h"
 #include "tools/common/key.h"
 
@@ -78,7 +79,8 @@ static void settle(struct cli *c, int operand, struct request *r)
 static void sort_shards(struct job *j)
 {
 	for (size_t i = 1; i < j->r->shards; i++)
-		for (size_t k = i; k > 0 && j->file[k].f.patch_begin < j->file[k - 1].f.patch_begin; k--) {
+		for (size_t k = i;
+		     k > 0 && j->file[k].f.patch_begin < j->file[k - 1].f.patch_begin; k--) {
 			struct ff_file file = j->file[k];
 			const char *name = j->name[k];
 			j->file[k] = j->file[k - 1];
@@ -158,7 +160,8 @@ static int kept(struct job *j, const char *key, struct err *e)
 	struct solution s = { 0 };
 	struct cache_info info = { 0 };
 	int same_cameras, status;
-	enum key_fit fit = file_cache_up_to_date(j->r->output, "twopass.rad", key, j->cli->any_version);
+	enum key_fit fit = file_cache_up_to_date(j->r->output, "twopass.rad", key,
+	                                         j->cli->any_version);
 
 	if (!fit || !(c = file_container_open(j->r->output, "twopass.rad", &ignored)))
 		return 0;
@@ -354,7 +357,8 @@ static void print_report(const struct job *j)
 	        "%.3g rms\n", solution_mean_error(&j->m, s),
 	        solution_relative_rms(&j->m, s, s->error.sampling));
 	fprintf(out, "elements      %.3g relative error of irradiance between elements "
-	        "(estimate), rms over area\n", solution_relative_rms(&j->m, s, s->error.discretisation));
+	        "(estimate), rms over area\n",
+	        solution_relative_rms(&j->m, s, s->error.discretisation));
 	if (r->guessed > 0)
 		fprintf(out, "directions    %.3g of what is emitted used the nearest known direction\n",
 		       r->guessed);

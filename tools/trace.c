@@ -322,8 +322,9 @@ static int write_picture(const struct trace *t, const struct shot *s,
 
 /* The best picture that the budget allows: a coarse one first, then as many times its
  * samples and rays as fit in the time that is left. */
-static int render_within(const struct trace *t, const struct shot *s, const struct progress *progress,
-                         struct image *im, struct view_stats *v, struct err *e)
+static int render_within(const struct trace *t, const struct shot *s,
+                         const struct progress *progress, struct image *im, struct view_stats *v,
+                         struct err *e)
 {
 	/* Doublings of the first picture at most, which has 4096 samples a pixel then. And it has an
 	 * eighth of the usual rays, so that it takes little of the budget; a tenth of what is left is

@@ -78,7 +78,8 @@ static int compute_unnamed(struct twopass_scene *s, const struct ff_options *o, 
 {
 	const char *folder = getenv("TMPDIR");
 	char path[4096];
-	int n = snprintf(path, sizeof path, "%s/twopass.XXXXXX", folder && *folder ? folder : "/tmp");
+	int n = snprintf(path, sizeof path, "%s/twopass.XXXXXX",
+	                 folder && *folder ? folder : "/tmp");
 	int fd = n < (int)sizeof path ? mkstemp(path) : -1;
 
 	if (fd < 0)
@@ -126,7 +127,8 @@ int twopass_form_factor_row(const struct twopass_scene *s, size_t i, double *to,
 		const uint32_t row = s->matrix.row[i];
 		ff_patch_matrix_row(&s->matrix, i, to, &to[s->patches], &to[s->patches + 1]);
 		if (row_error)
-			*row_error = row == FF_NO_ROW ? (double)NAN : (double)s->ff.f.row.error[row];
+			*row_error = row == FF_NO_ROW ? (double)NAN
+			                              : (double)s->ff.f.row.error[row];
 	}
 	return api_status(&e, error);
 }

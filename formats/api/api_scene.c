@@ -133,7 +133,8 @@ static int make_mesh(struct twopass_scene *s, const char *path,
 		bad = err_set(e, "%s: %s", path, why.text);
 	mesh_report_free(&meshed);
 	gltf_report_free(&read);
-	return bad || api_history(&s->info, NULL, "twopass_mesh", path, e) || prepare(s, e) ? -1 : 0;
+	return bad || api_history(&s->info, NULL, "twopass_mesh", path, e) || prepare(s, e)
+	     ? -1 : 0;
 }
 
 struct twopass_scene *twopass_mesh(const char *gltf, const struct twopass_mesh_options *options,

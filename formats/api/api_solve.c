@@ -2,6 +2,7 @@
 #include "formats/api/api_scene.h"
 #include "lib/interpolate/discretisation.h"
 #include "lib/radiosity/radiosity.h"
+#include "lib/radiosity/transport.h"
 
 struct twopass_solve_options twopass_solve_defaults(void)
 {

@@ -111,8 +111,10 @@ static void geometry_id(const struct model *m, char hex[33])
 	file_digest_bytes(d, m->patch.start, (m->patch.n + 1) * sizeof *m->patch.start);
 	file_digest_bytes(d, m->patch.surface, m->patch.n * sizeof *m->patch.surface);
 	file_digest_bytes(d, m->patch.loop, (m->patch.n + 1) * sizeof *m->patch.loop);
-	file_digest_bytes(d, m->patch.loop_start, (m->patch.loops + 1) * sizeof *m->patch.loop_start);
-	file_digest_bytes(d, m->patch.loop_index, m->patch.loop_indices * sizeof *m->patch.loop_index);
+	file_digest_bytes(d, m->patch.loop_start,
+	                  (m->patch.loops + 1) * sizeof *m->patch.loop_start);
+	file_digest_bytes(d, m->patch.loop_index,
+	                  m->patch.loop_indices * sizeof *m->patch.loop_index);
 	file_digest_end(d, hex);
 }
 
@@ -178,7 +180,8 @@ int file_cache_write_info(struct container_writer *w, const char *format,
 	};
 
 	for (size_t k = 0; k < sizeof meta / sizeof *meta; k++)
-		if (meta[k].value && *meta[k].value && file_container_meta(w, meta[k].key, meta[k].value, e))
+		if (meta[k].value && *meta[k].value &&
+		    file_container_meta(w, meta[k].key, meta[k].value, e))
 			return -1;
 	return 0;
 }

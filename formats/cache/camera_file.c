@@ -12,7 +12,8 @@ static const void *rows(const struct container *c, const char *name, enum dtype 
                         uint64_t n, uint64_t width, struct err *e)
 {
 	uint64_t shape[2] = { n, width };
-	const struct container_view *v = file_container_need(c, name, t, width > 1 ? 2 : 1, shape, e);
+	const struct container_view *v = file_container_need(c, name, t, width > 1 ? 2 : 1, shape,
+	                                                     e);
 
 	return v && file_container_verify(c, v, e) == 0 ? v->data : NULL;
 }

@@ -1,3 +1,4 @@
+/* Gives a .ff file the names of a scene whose surfaces, lights or materials were renamed. */
 #include "formats/cache/ff_file.h"
 
 #include <stdlib.h>
@@ -46,7 +47,8 @@ int file_ff_rename(const char *path, const struct model *m, struct err *e)
 		file_container_close(c);
 		return 0;
 	}
-	struct container_writer *w = file_container_verify_all(c, e) ? NULL : file_container_create(path, e);
+	struct container_writer *w = file_container_verify_all(c, e)
+	                           ? NULL : file_container_create(path, e);
 	if (w && !copy(w, c, e) && !file_cache_write_names(w, "materials", mt->name, mt->n, e) &&
 	    !file_cache_write_names(w, "surfaces", m->surface.name, m->surface.n, e) &&
 	    !file_cache_write_names(w, "lights", m->light.name, m->light.n, e))

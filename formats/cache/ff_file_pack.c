@@ -12,7 +12,8 @@ enum { WORTH_SHARING = 8 };
 
 void file_ff_packed_free(struct ff_packed *p)
 {
-	struct array *v[] = { &p->word, &p->block_column, &p->column, &p->value, &p->start, &p->scale };
+	struct array *v[] = { &p->word, &p->block_column, &p->column, &p->value, &p->start,
+		            &p->scale };
 
 	for (size_t i = 0; i < sizeof v / sizeof *v; i++)
 		free(v[i]->data);

@@ -1,3 +1,4 @@
+/* Form factors from a .ff file, which stays mapped. */
 #include "formats/cache/ff_file.h"
 
 #include <inttypes.h>
@@ -73,7 +74,8 @@ static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
 		{ { &f->block.cut, "block_cut", DT_F64, 1, { f->block.n } }, FIELD_ZEROS },
 		{ { &f->block.arrival, "block_arrival", DT_U64, 1, { f->block.n + 1 } }, FIELD_ZEROS },
 		{ { &f->arrival.target, "arrival_target", DT_U32, 1, { f->arrival.n } }, FIELD_EMPTY },
-		{ { &f->arrival.direction, "arrival_direction", DT_F32, 2, { f->arrival.n, 3 } }, FIELD_EMPTY },
+		{ { &f->arrival.direction, "arrival_direction", DT_F32, 2, { f->arrival.n, 3 } },
+		  FIELD_EMPTY },
 		{ { &f->link.target, "link_target", DT_U32, 1, { f->link.n } }, FIELD_EMPTY },
 		{ { &f->link.source, "link_source", DT_U32, 1, { f->link.n } }, FIELD_EMPTY },
 		{ { &f->link.last, "link_last", DT_U32, 1, { f->link.n } }, FIELD_EMPTY },
@@ -108,7 +110,8 @@ static int map_ff(struct ff_file *o, struct err *e)
 	struct ff *f = &o->f;
 	uint32_t *part = NULL, *most = NULL;
 
-	if (get_receivers(c, f, e) || get_counts(c, f, e) || map_arrays(c, f, &part, &most, &o->made, e))
+	if (get_receivers(c, f, e) || get_counts(c, f, e) ||
+	    map_arrays(c, f, &part, &most, &o->made, e))
 		return -1;
 	f->patch_begin = part[0];
 	f->patch_end = part[1];

@@ -1,3 +1,4 @@
+/* Form factors into a .ff file, batch by batch. */
 #include "formats/cache/ff_file.h"
 
 #include <stdlib.h>

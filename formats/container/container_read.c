@@ -1,3 +1,4 @@
+/* The reader of container.h: maps a file and believes nothing in it. */
 #include "formats/container/container.h"
 
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* The writer of container.h: collects arrays, then puts the file together. */
 #include "formats/container/container.h"
 
 #include <errno.h>

@@ -10,5 +10,6 @@ enum key_fit file_key_fit(const char *have, const char *want, int any_version)
 		return KEY_DIFFERS;
 	if (strcmp(have, want) == 0)
 		return KEY_FITS;
-	return any_version && strncmp(have, want, made_of + 1) == 0 ? KEY_OTHER_VERSION : KEY_DIFFERS;
+	return any_version && strncmp(have, want, made_of + 1) == 0 ? KEY_OTHER_VERSION
+	                                                            : KEY_DIFFERS;
 }

@@ -1,3 +1,4 @@
+/* Elements of accessors, of any type and layout (gltf_doc.h). */
 #include <string.h>
 
 #include "formats/gltf/gltf_doc.h"

@@ -38,7 +38,8 @@ static int collect(struct palette *p)
 				p->index[p->n++] = i;
 			}
 		for (size_t i = 0; i < s->n; i++)
-			s->material[i] = number[s->material[i] == UINT32_MAX ? all : s->material[i]];
+			s->material[i] = number[s->material[i] == UINT32_MAX ? all
+			                                                     : s->material[i]];
 	}
 	free(number);
 	return p->e->set ? -1 : 0;

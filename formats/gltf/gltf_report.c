@@ -98,7 +98,8 @@ static int note_primitives(struct gltf_reader *g, struct err *e)
 		const json_t *list = json_object_get(json_array_get(meshes, m), "primitives");
 		for (size_t p = 0; p < json_array_size(list); p++) {
 			const json_t *o = json_array_get(list, p);
-			coloured += json_object_get(json_object_get(o, "attributes"), "COLOR_0") != NULL;
+			coloured += json_object_get(json_object_get(o, "attributes"),
+			                            "COLOR_0") != NULL;
 			morphed += json_array_size(json_object_get(o, "targets")) > 0;
 		}
 	}

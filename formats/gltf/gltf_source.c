@@ -1,3 +1,4 @@
+/* The bytes of a glTF file: JSON, GLB chunks, buffers (gltf_doc.h). */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -152,7 +152,8 @@ static void set_rows(struct output *o, exr_encode_pipeline_t *p)
 
 	for (int c = 0; c < p->channel_count; c++) {
 		exr_coding_channel_info_t *ch = &p->channels[c];
-		const float *rows = picture_image_plane(im, picture_image_channel(im, ch->channel_name)) +
+		const int channel = picture_image_channel(im, ch->channel_name);
+		const float *rows = picture_image_plane(im, channel) +
 		                    (size_t)p->chunk.start_y * (size_t)im->width;
 
 		if (ch->data_type == EXR_PIXEL_HALF)

@@ -250,7 +250,8 @@ int picture_tonemap_scale(const struct image *im, const int channel[3], struct t
 		s->min = s->max / 10;
 	free(h);
 	if (s->logarithmic && !(s->min > 0))
-		return err_set(e, "a logarithmic scale cannot begin at %g; use a linear one", s->min);
+		return err_set(e, "a logarithmic scale cannot begin at %g; use a linear one",
+		               s->min);
 	if (!(s->min < s->max))
 		return err_set(e, "no scale reaches from %g to %g", s->min, s->max);
 	return 0;

@@ -266,14 +266,16 @@ static void set_feed(const struct element_pass *pass, uint32_t row, uint64_t b, 
 		x->from_emitter[k] = pass->block_flux[0][at + k];
 		x->from_diffuse[k] = pass->block_flux[1][at + k];
 	}
-	x->variance = __builtin_convertvector(variance_of(pass, row, b) * (1 / pass->unit), lanes_f32);
+	x->variance = __builtin_convertvector(variance_of(pass, row, b) * (1 / pass->unit),
+	                                      lanes_f32);
 }
 
 /* Blocks with flux in the four channels in work, or any where they have variances. */
 static void set_feeds(struct element_pass *pass)
 {
 	const struct transport *t = pass->t;
-	const size_t last = pass->first < (size_t)pass->s->bands ? pass->channels : pass->first + LANES;
+	const size_t last = pass->first < (size_t)pass->s->bands ? pass->channels
+	                                                         : pass->first + LANES;
 
 	pass->feeds = 0;
 	for (uint32_t row = 0; row < t->rows; row++)
@@ -285,7 +287,8 @@ static void set_feeds(struct element_pass *pass)
 				           (unsigned)(pass->block_flux[1][at] > 0) << 1;
 			}
 			if (carries)
-				set_feed(pass, row, b, (uint8_t)carries, &pass->feed[pass->feeds++]);
+				set_feed(pass, row, b, (uint8_t)carries,
+				         &pass->feed[pass->feeds++]);
 		}
 }
 
@@ -295,7 +298,8 @@ static void put_channels(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct element_pass *pass = arg;
 	const struct model *m = pass->t->m;
-	double *to[H_PARTS] = { pass->s->irradiance.direct, pass->s->irradiance.caustic, pass->s->irradiance.indirect };
+	const struct irradiance *h = &pass->s->irradiance;
+	double *to[H_PARTS] = { h->direct, h->caustic, h->indirect };
 	size_t bands = (size_t)pass->s->bands;
 
 	(void)thread;
@@ -343,8 +347,8 @@ static int add_channels(struct element_pass *pass, int threads, struct err *e)
 
 	pass->variance[0] = (lanes_f32 *)lanes_new(n, &variance, "irradiance", e);
 	pass->variance[1] = pass->variance[0] + n;
-	pass->feed = (struct feed *)lanes_new(pass->t->blocks * (sizeof *pass->feed / sizeof(lanes)), &feed,
-	                                   "flux by chain", e);
+	pass->feed = (struct feed *)lanes_new(pass->t->blocks * (sizeof *pass->feed / sizeof(lanes)),
+	                                      &feed, "flux by chain", e);
 	int bad = !at || !variance || !pass->feed;
 	for (int p = 0; !bad && p < H_PARTS; p++)
 		pass->flux[p] = at + (size_t)p * n;
@@ -378,8 +382,8 @@ static int block_fluxes(const struct transport *t, const struct solution *s, dou
 	for (uint32_t r = 0; !bad && r < t->rows; r++)
 		for (int origin = 0; origin < ORIGINS; origin++) {
 			double *to = flux[origin] + t->row_block[r] * channels;
-			radiosity_propagate_block_flux(&propagator, r, s->shot + (2 * (size_t)r + (size_t)origin) * channels,
-			                               to);
+			const double *shot = s->shot + (2 * (size_t)r + (size_t)origin) * channels;
+			radiosity_propagate_block_flux(&propagator, r, shot, to);
 			for (uint64_t b = t->row_block[r]; b < t->row_block[r + 1]; b++)
 				for (size_t c = 0; c < channels; c++)
 					*to++ /= t->block[b].sum > 0 ? t->block[b].sum : 1;
@@ -397,8 +401,9 @@ static int cut_ranges(struct element_pass *pass, struct err *e)
 		return -1;
 	for (uint32_t p = 0; p <= m->patch.n; p++) {
 		uint32_t begin = pass->to_patches ? p : m->patch.start[p];
-		for (; i <= pass->ranges && begin * (uint64_t)pass->ranges >= i * (uint64_t)pass->receivers; i++)
-			pass->cut[i] = begin;
+		while (i <= pass->ranges &&
+		       begin * (uint64_t)pass->ranges >= i * (uint64_t)pass->receivers)
+			pass->cut[i++] = begin;
 	}
 	return 0;
 }

@@ -8,13 +8,15 @@
 #include "lib/base/channels.h"
 #include "lib/base/mem.h"
 #include "lib/data/punctual.h"
+#include "lib/data/solution.h"
 #include "lib/scatter/bsdf.h"
 
 /* ---- who is in which ---- */
 
 static int emits(const struct model *m, uint32_t material)
 {
-	return bsdf_emits(&m->material, material, FRONT) || bsdf_emits(&m->material, material, BACK);
+	return bsdf_emits(&m->material, material, FRONT) ||
+	       bsdf_emits(&m->material, material, BACK);
 }
 
 static int shines(const struct model *m, uint32_t light)
@@ -65,7 +67,8 @@ int radiosity_groups_set(struct solution *s, const struct model *m, int apart, s
 		return -1;
 	for (uint32_t i = 0; apart && i < s->emitters; i++) {
 		const uint32_t materials = (uint32_t)m->material.n;
-		const char *name = i < materials ? m->material.name[i] : m->light.name[i - materials];
+		const char *name = i < materials ? m->material.name[i]
+		                                 : m->light.name[i - materials];
 		if (i < materials ? !emits(m, i) || !is_used(m, i) : !shines(m, i - materials))
 			continue;
 		if (groups == most)
@@ -189,7 +192,8 @@ int radiosity_groups_mix(struct solution *s, struct model *m, const char *mix, s
 			unknown(s, at, e);
 			break;
 		}
-		at = factors(s, at + strlen(s->group_name[g]) + 1, factor + g * (size_t)s->bands, e);
+		at = factors(s, at + strlen(s->group_name[g]) + 1, factor + g * (size_t)s->bands,
+		             e);
 		if (!at)
 			break;
 	}

@@ -3,8 +3,10 @@
 #ifndef TWOPASS_LIGHT_GROUPS_H
 #define TWOPASS_LIGHT_GROUPS_H
 
-#include "lib/data/model.h"
-#include "lib/data/solution.h"
+#include "lib/base/err.h"
+
+struct model;
+struct solution;
 
 /* The name of the only group where emitters are not kept apart. */
 #define LIGHT_GROUP_ALL "all"

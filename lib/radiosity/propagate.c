@@ -25,7 +25,8 @@ static void fill_splits(struct propagator *s)
 			size_t k = c % (size_t)s->bands;
 			part[SPLIT_RHO * width + c] = mt->rho_d[at + k];
 			part[SPLIT_TAU * width + c] = mt->tau_d[at + k];
-			double r = lobe_r ? mt->rho_s[at + k] : 0, t = lobe_t ? mt->tau_s[at + k] : 0;
+			double r = lobe_r ? mt->rho_s[at + k] : 0;
+			double t = lobe_t ? mt->tau_s[at + k] : 0;
 			part[SPLIT_LOBES * width + c] = r + t;
 			share[c] = r > 0 ? r / (r + t) : 0;
 			share[width + c] = r + t > 0 ? 1 - share[c] : 0;
@@ -62,7 +63,8 @@ void radiosity_shot_ledger_free(struct shot_ledger *x)
 	*x = (struct shot_ledger){ 0 };
 }
 
-int radiosity_propagator_init(struct propagator *s, const struct transport *t, size_t groups, struct err *e)
+int radiosity_propagator_init(struct propagator *s, const struct transport *t, size_t groups,
+                              struct err *e)
 {
 	*s = (struct propagator){ .t = t, .m = t->m, .bands = t->m->bands };
 	s->channels = groups * (size_t)s->bands;
@@ -73,7 +75,8 @@ int radiosity_propagator_init(struct propagator *s, const struct transport *t, s
 	s->split = lanes_new(2 * t->m->material.n * SPLITS * s->vectors, &s->room[0], "albedos", e);
 	s->share = lanes_new(2 * t->m->material.n * 2 * s->vectors, &s->room[3], "albedos", e);
 	s->surface = mem_new(2 * t->m->patch.n, sizeof *s->surface, "albedos", e);
-	if (!s->chain_flux || !s->touched || !s->is_touched || !s->split || !s->share || !s->surface)
+	if (!s->chain_flux || !s->touched || !s->is_touched || !s->split || !s->share ||
+	    !s->surface)
 		return -1;
 	fill_splits(s);
 	return 0;
@@ -280,7 +283,8 @@ static ALWAYS_INLINE void land_all(const struct landing *l, uint64_t i, uint64_t
 	for (size_t k = 0; k < N; k++)
 		sum[k].absorbed = sum[k].arrived - sum[k].kept;
 	for (; i < end; i++) {
-		if ((i - l->block->special) % FETCHED == 0 && l->v == 0 && i + FETCHED < l->block[1].run)
+		if ((i - l->block->special) % FETCHED == 0 && l->v == 0 &&
+		    i + FETCHED < l->block[1].run)
 			fetch_links(l->s, l->block, i + FETCHED, l->block[1].run, l->origin);
 		land_general(l, i, N, n, sum);
 	}
@@ -300,10 +304,12 @@ static void land(const struct landing *l, size_t N, uint64_t begin, uint64_t end
 
 	switch (N) {
 	case 1:
-		all ? land_all(l, begin, end, 1, 1, ledger) : land_all(l, begin, end, 1, l->n, ledger);
+		all ? land_all(l, begin, end, 1, 1, ledger)
+		    : land_all(l, begin, end, 1, l->n, ledger);
 		break;
 	case 2:
-		all ? land_all(l, begin, end, 2, 2, ledger) : land_all(l, begin, end, 2, l->n, ledger);
+		all ? land_all(l, begin, end, 2, 2, ledger)
+		    : land_all(l, begin, end, 2, l->n, ledger);
 		break;
 	case 3:
 		land_all(l, begin, end, 3, l->n, ledger);
@@ -390,11 +396,12 @@ void radiosity_propagate_fetch(const struct propagator *s, uint32_t row, int ori
 		return;
 	}
 	const uint64_t first = block->run, n = block[1].run - first;
+	const uint64_t fetched = first + (n < ROW_FETCHED ? n : ROW_FETCHED);
 	if (ahead == 1) {
 		fetch_links(s, block, block->special, first + n, origin);
 		return;
 	}
-	for (uint64_t i = first; i < first + (n < ROW_FETCHED ? n : ROW_FETCHED); i += LINE / sizeof *t->run_sum) {
+	for (uint64_t i = first; i < fetched; i += LINE / sizeof *t->run_sum) {
 		__builtin_prefetch(t->run_target + i);
 		__builtin_prefetch(t->run_sum + i);
 	}
@@ -432,7 +439,8 @@ void radiosity_propagate_row(struct propagator *s, uint32_t row, int origin, con
 	finish(s, ledger->cut);
 }
 
-void radiosity_propagate_block_flux(struct propagator *s, uint32_t row, const double *flux, double *block_flux)
+void radiosity_propagate_block_flux(struct propagator *s, uint32_t row, const double *flux,
+                                    double *block_flux)
 {
 	const struct transport *t = s->t;
 	double x[CHANNELS_MAX];

@@ -113,8 +113,8 @@ static void land(struct propagator *s, const struct block *block, uint64_t run, 
 	if (link == FF_NO_ROW)
 		add_to(&l->cut, lobes);
 	else if (link != RUN_FOLLOWED)
-		keep(radiosity_exact_link(s, 2 * (uint64_t)(link & ~RUN_GUESSED) + (uint64_t)origin), v,
-		     lobes, l);
+		keep(radiosity_exact_link(s, 2 * (uint64_t)(link & ~RUN_GUESSED) + (uint64_t)origin),
+		     v, lobes, l);
 	if (link != FF_NO_ROW && link != RUN_FOLLOWED && (link & RUN_GUESSED))
 		add_to(&l->guessed, lobes);
 }
@@ -126,8 +126,8 @@ static void book_sum(struct propagate_exact *x, size_t v, const struct sum *s, l
 	*to += s->high + s->low;
 }
 
-void radiosity_exact_land(struct propagator *s, const struct block *block, int origin, const lanes *in,
-                          struct shot_ledger *ledger)
+void radiosity_exact_land(struct propagator *s, const struct block *block, int origin,
+                          const lanes *in, struct shot_ledger *ledger)
 {
 	for (size_t v = 0; v < s->vectors; v++) {
 		struct landed l = { 0 };

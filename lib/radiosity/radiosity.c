@@ -7,6 +7,7 @@
 #include "lib/base/mem.h"
 #include "lib/radiosity/light_groups.h"
 #include "lib/radiosity/shoot.h"
+#include "lib/radiosity/truncation_bound.h"
 
 /* ---- the beginning ---- */
 
@@ -39,7 +40,8 @@ static int solution_arrays(struct solution *s, const struct model *m,
 	       s->unshot.link && s->shot && s->ledger ? 0 : -1;
 }
 
-/* Flux, in the scene's unit: what is larger cannot be squared for variances (DBL_MAX is 1.8e308). */
+/* Flux, in the scene's unit: what is larger cannot be squared for variances (DBL_MAX is
+ * 1.8e308). */
 static const double brightest = 1e150;
 
 int radiosity_begin(struct solution *s, const struct model *m, const struct transport *t,
@@ -135,7 +137,8 @@ static int is_slow(struct shooter *v, double unshot, double stop)
 		return 1;
 	if (!(sweeps >= SWEEPS))
 		return 0;
-	double rate = round[ROUND_UNSHOT] > 0 ? log(round[ROUND_UNSHOT] / unshot) / sweeps : INFINITY;
+	double rate = round[ROUND_UNSHOT] > 0 ? log(round[ROUND_UNSHOT] / unshot) / sweeps
+	                                      : INFINITY;
 	round[ROUND_WORK] = 0;
 	round[ROUND_UNSHOT] = unshot;
 	return stop > 0 && log(unshot / stop) > WORTH * rate;
@@ -206,7 +209,8 @@ static void report(const struct shooter *v, int threads, struct radiosity_report
 	r->guessed = v->guessed / emitted;
 	r->passes = v->t->runs ? (double)v->propagator.runs / (double)v->t->runs : 0;
 	r->solve_bytes = v->propagator.bytes;
-	r->bound = radiosity_truncation_bound(v->t, &v->components, v->s, threads, &r->solve_bytes) / emitted;
+	r->bound = radiosity_truncation_bound(v->t, &v->components, v->s, threads,
+	                                      &r->solve_bytes) / emitted;
 }
 
 int radiosity_shoot(struct solution *s, const struct transport *t,

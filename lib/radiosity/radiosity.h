@@ -42,10 +42,13 @@
 #ifndef TWOPASS_RADIOSITY_H
 #define TWOPASS_RADIOSITY_H
 
-#include "lib/base/parallel.h"
-#include "lib/data/solution.h"
-#include "lib/radiosity/components.h"
-#include "lib/radiosity/transport.h"
+#include <stdint.h>
+
+#include "lib/base/err.h"
+
+struct model;
+struct solution;
+struct transport;
 
 struct radiosity_options {
 	double stop;           /* unshot / emitted of each connected component */
@@ -100,11 +103,5 @@ int radiosity_shoot(struct solution *s, const struct transport *t,
  * sent. O(entries). 0, or -1 and e. */
 int radiosity_element_irradiance(struct solution *s, const struct transport *t, int threads,
                                  struct radiosity_report *r, struct err *e);
-
-/* An upper bound of the flux that will still arrive anywhere because of what is unshot;
- * INFINITY if it cannot be bounded. Adds to *bytes what it reads of runs.
- * O(runs x steps), of which there are at most STEPS_MAX. */
-double radiosity_truncation_bound(const struct transport *t, const struct components *components,
-                                  const struct solution *s, int threads, double *bytes);
 
 #endif

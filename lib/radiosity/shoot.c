@@ -34,8 +34,8 @@ static void weigh_components(struct shooter *v)
 
 	for (uint32_t i = 0; i < s->sources; i++)
 		for (int k = 0; k < s->bands; k++)
-			v->emitted[v->components.of[i] * s->groups + solution_group(s, v->t->m, i)] +=
-				radiosity_emitted(v->t->m, i, k);
+			v->emitted[v->components.of[i] * s->groups +
+			           solution_group(s, v->t->m, i)] += radiosity_emitted(v->t->m, i, k);
 	for (size_t i = 0; i < v->components.n; i++)
 		for (size_t c = 0; c < v->propagator.channels; c++) {
 			double emitted = v->emitted[i * s->groups + c / bands];
@@ -73,7 +73,8 @@ static void set_costs(struct shooter *v)
 
 static int new_arrays(struct shooter *v, struct err *e)
 {
-	size_t components = v->components.n, vectors = v->propagator.vectors, sides = v->s->patch_sides;
+	size_t components = v->components.n, vectors = v->propagator.vectors;
+	size_t sides = v->s->patch_sides;
 
 	v->emitted = mem_new(components * v->s->groups, sizeof *v->emitted, "priorities", e);
 	v->cost = mem_new(sides, sizeof *v->cost, "priorities", e);
@@ -84,16 +85,18 @@ static int new_arrays(struct shooter *v, struct err *e)
 	v->diffuse = lanes_new(vectors, &v->room[3], "flux", e);
 	v->unshot = lanes_new(vectors, &v->room[4], "flux", e);
 	v->component_unshot = lanes_new(components * vectors, &v->room[5], "priorities", e);
-	return v->emitted && v->component_unshot && v->cost && v->link_cost && v->weight && v->out &&
-	       v->emission && v->diffuse && v->unshot ? 0 : -1;
+	return v->emitted && v->component_unshot && v->cost && v->link_cost && v->weight &&
+	       v->out && v->emission && v->diffuse && v->unshot ? 0 : -1;
 }
 
 int radiosity_shooter_init(struct shooter *v, struct solution *s, const struct transport *t,
                            struct err *e)
 {
 	*v = (struct shooter){ .s = s, .t = t };
-	if (radiosity_propagator_init(&v->propagator, t, s->groups, e) || radiosity_propagator_load(&v->propagator, s, e) ||
-	    radiosity_shot_ledger_new(&v->booked, v->propagator.vectors, e) || radiosity_components_init(&v->components, t, e) ||
+	if (radiosity_propagator_init(&v->propagator, t, s->groups, e) ||
+	    radiosity_propagator_load(&v->propagator, s, e) ||
+	    radiosity_shot_ledger_new(&v->booked, v->propagator.vectors, e) ||
+	    radiosity_components_init(&v->components, t, e) ||
 	    new_arrays(v, e))
 		return -1;
 	weigh_components(v);
@@ -186,7 +189,8 @@ static double worst_part(const struct shooter *v)
 
 	for (size_t i = 0; i < v->components.n; i++)
 		for (size_t g = 0; g < v->s->groups; g++) {
-			const double *part = (double *)(v->component_unshot + i * v->propagator.vectors) + g * bands;
+			const double *part = (double *)(v->component_unshot +
+			                                i * v->propagator.vectors) + g * bands;
 			double sum = 0;
 			for (size_t k = 0; k < bands; k++)
 				sum += part[k];
@@ -329,7 +333,8 @@ void radiosity_shoot_link(struct shooter *v, uint64_t l, const lanes *flux, doub
 	for (uint64_t way = 0; way < 2; way++) {
 		uint32_t row = t->link_row[(l & ~(uint64_t)1) + way];
 		if (row != FF_NO_ROW)
-			shoot_row(v, row, (int)(l & 1), flux, share + way * v->propagator.vectors, shot);
+			shoot_row(v, row, (int)(l & 1), flux, share + way * v->propagator.vectors,
+			          shot);
 	}
 }
 

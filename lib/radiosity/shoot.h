@@ -7,7 +7,6 @@
 
 #include "lib/radiosity/components.h"
 #include "lib/radiosity/propagate.h"
-#include "lib/radiosity/radiosity.h"
 
 struct shooter {
 	struct solution *s;

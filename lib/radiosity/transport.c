@@ -129,8 +129,8 @@ static void put_rows(struct transport *t, uint32_t shard, const uint32_t *chain,
 	}
 	for (size_t b = 0; b < f->block.n; b++)
 		t->block[block + b] = (struct block){ .chain = chain[f->block.chain[b]],
-			.shard = shard, .local = b, .escape = f->block.escape[b], .black = f->block.black[b],
-			.lost = f->block.lost[b], .cut = f->block.cut[b] };
+			.shard = shard, .local = b, .escape = f->block.escape[b],
+			.black = f->block.black[b], .lost = f->block.lost[b], .cut = f->block.cut[b] };
 }
 
 static int join(struct transport *t, int threads, struct err *e)
@@ -144,7 +144,8 @@ static int join(struct transport *t, int threads, struct err *e)
 		if ((bad = !chain))
 			break;
 		put_rows(t, i, chain, row, block);
-		radiosity_transport_put_links(t->shard[i], chain, (uint32_t)row, (uint32_t)link, l + link);
+		radiosity_transport_put_links(t->shard[i], chain, (uint32_t)row, (uint32_t)link,
+		                              l + link);
 		row += t->shard[i]->row.n;
 		block += t->shard[i]->block.n;
 		link += t->shard[i]->link.n;

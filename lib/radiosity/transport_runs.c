@@ -47,7 +47,8 @@ static void set_kinds(struct pass *p)
 		p->surface[ps] = 2 * material + (ps & 1);
 	}
 	for (uint32_t i = 0; i < 2 * mt->n; i++)
-		if (bsdf_has_lobe(mt, i >> 1, (int)(i & 1), 0) || bsdf_has_lobe(mt, i >> 1, (int)(i & 1), 1))
+		if (bsdf_has_lobe(mt, i >> 1, (int)(i & 1), 0) ||
+		    bsdf_has_lobe(mt, i >> 1, (int)(i & 1), 1))
 			p->lobed[p->lobes++] = i;
 }
 
@@ -83,7 +84,8 @@ static ALWAYS_INLINE void add_entry(struct runs *r, uint32_t target, double valu
 static ALWAYS_INLINE void add_list(const struct transport *t, const struct ff *f, uint64_t b,
                                    struct runs *to, int sums)
 {
-	uint64_t word = ff_first_word(f, b), first = f->block.start[b], n = f->block.start[b + 1] - first;
+	uint64_t word = ff_first_word(f, b), first = f->block.start[b];
+	uint64_t n = f->block.start[b + 1] - first;
 	struct runs r = *to;
 
 	for (uint64_t i = 0; i < n; i++)
@@ -229,7 +231,8 @@ static void fill_block(const struct pass *p, const struct row_chains *c, struct 
 			t->run_link[block->link + (at - block->special)] =
 				follows[p->surface[target]]
 					? RUN_FOLLOWED
-					: radiosity_transport_find_link(t, p->link, block, target, source, &known[target]);
+					: radiosity_transport_find_link(t, p->link, block, target,
+					                                source, &known[target]);
 	}
 }
 
@@ -279,8 +282,9 @@ static int list_onward(struct transport *t, struct err *e)
 			memcpy(way, c->slot + first, sizeof way);
 			for (uint32_t k = 0; k < 2 && !bad; k++)
 				if (way[k] != CHAIN_NONE && (lobes || !c->finite[way[k]]))
-					bad = add_onward(&list, block->onward, (struct onward){ child[way[k]],
-					                 first + k, t->run_sum[i] }, e);
+					bad = add_onward(&list, block->onward,
+					                 (struct onward){ child[way[k]], first + k,
+					                                  t->run_sum[i] }, e);
 		}
 	}
 	t->block[t->blocks].onward = list.n;
@@ -321,8 +325,8 @@ int radiosity_transport_make_runs(struct transport *t, const struct link_key *li
 	p.has = mem_new(each * t->chains.n, sizeof *p.has, what, e);
 	p.follows = mem_new(each * surfaces, 1, what, e);
 	p.known = mem_new(each * sides, sizeof *p.known, what, e);
-	int bad = !p.kind || !p.surface || !p.lobed || !p.target || !p.sum || !p.has || !p.follows ||
-	          !p.known || runs_of(&p, threads, e);
+	int bad = !p.kind || !p.surface || !p.lobed || !p.target || !p.sum || !p.has ||
+	          !p.follows || !p.known || runs_of(&p, threads, e);
 	free(p.kind);
 	free(p.surface);
 	free(p.lobed);

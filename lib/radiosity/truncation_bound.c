@@ -11,13 +11,16 @@
  *
  * Where a row itself follows what a side's lobes send on, its later blocks count that: the
  * side then counts with what its other reflections do. So N and D have two values a side. */
+#include "lib/radiosity/truncation_bound.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "lib/base/channels.h"
 #include "lib/base/mem.h"
+#include "lib/base/parallel.h"
 #include "lib/radiosity/propagate.h"
-#include "lib/radiosity/radiosity.h"
 #include "lib/scatter/bsdf.h"
 
 /* Passes over all runs at most: where 64 do not make the bound tight, albedos are near 1 and it
@@ -177,7 +180,8 @@ static double remainder_of(struct bound *x, int add)
 		for (size_t k = 0; k < x->bands; k++) {
 			double d = ((double *)(x->d + i * x->vectors))[k];
 			double *n = (double *)(x->n + i * x->vectors) + k;
-			double q = x->ratio[x->components->of[i % (2 * x->t->m->patch.n)] * x->bands + k];
+			uint32_t component = x->components->of[i % (2 * x->t->m->patch.n)];
+			double q = x->ratio[component * x->bands + k];
 			if (x->dark[k])
 				continue;
 			double rest = !(d > 0) ? 0 : q < 1 ? d * q / (1 - q) : INFINITY;
@@ -281,7 +285,8 @@ double radiosity_truncation_bound(const struct transport *t, const struct compon
 	x.ratio = mem_new(components->n, bands * sizeof *x.ratio, "bound", &e);
 	x.d = lanes_new(4 * t->m->patch.n * x.vectors, &room[0], "bound", &e);
 	x.n = lanes_new(4 * t->m->patch.n * x.vectors, &room[1], "bound", &e);
-	if (radiosity_propagator_init(&propagator, t, 1, &e) == 0 && x.in && x.row && x.ratio && x.d && x.n) {
+	if (radiosity_propagator_init(&propagator, t, 1, &e) == 0 && x.in && x.row && x.ratio &&
+	    x.d && x.n) {
 		unit_rows(&x, &propagator);
 		find_dark(&x, s);
 		if (arrivals(&x, threads)) {

@@ -51,6 +51,20 @@ done
 check "the bytes are the same" sh -c \
 	"cmp '$T/a.ff' '$T/first.ff' && cmp '$T/a.rad' '$T/first.rad' && cmp '$T/classic.exr' '$T/first.exr'"
 
+# stated PROGRAM OPTIONS: numbers that --help states to be defaults, as options, but for some.
+stated() {
+	"$1" --help | sed -nE 's/^ +(-., )?(--[a-z-]+) .*\(default:? ([0-9.][^ ;,)]*).*/\2=\3/p' |
+		grep -vE "^--($2)="
+}
+[ "$(for p in mesh ffcalc shoot trace; do stated $p none; done | wc -l)" -ge 20 ]
+result $? "--help states defaults"
+says yes "mesh: they are its defaults" mesh "$T/a.gltf" -o "$T/a.mesh" $M \
+	$(stated mesh 'bands|patch-size|element-size|refine.*')
+says yes "ffcalc: they are its defaults" ffcalc "$T/a.mesh" -o "$T/a.ff" $F $(stated ffcalc samples)
+says yes "shoot: they are its defaults" shoot "$T/a.mesh" "$T/a.ff" -o "$T/a.rad" $(stated shoot none)
+says yes "trace: they are its defaults" trace "$T/a.rad" -c classic -o "$T/classic.exr" $V \
+	$(stated trace 'size|up|fov|samples')
+
 says no "ffcalc: other options" ffcalc "$T/a.mesh" -o "$T/a.ff" -m rays -n 512
 says no "shoot: other form factors" shoot "$T/a.mesh" "$T/a.ff" -o "$T/a.rad"
 says no "trace: another size" trace "$T/a.rad" -c classic -o "$T/classic.exr" -s 16x16 --samples 1

@@ -8,6 +8,7 @@
 #include "lib/data/punctual.h"
 #include "lib/occlusion/direct.h"
 #include "lib/radiosity/radiosity.h"
+#include "lib/radiosity/transport.h"
 #include "lib/reference/pathtrace.h"
 #include "lib/scatter/bsdf.h"
 #include "tests/unit/fixtures/check.h"

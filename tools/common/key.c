@@ -19,7 +19,8 @@ void key_end(struct digest *d, char key[KEY_BYTES])
 	char made_of[33];
 
 	file_digest_end(d, made_of);
-	snprintf(key, KEY_BYTES, "%s%s%s", made_of, *made_of ? ":" : "", *made_of ? program_code : "");
+	snprintf(key, KEY_BYTES, "%s%s%s", made_of, *made_of ? ":" : "",
+	         *made_of ? program_code : "");
 }
 
 void key_kept(const struct cli *c, const char *path, enum key_fit fit)

@@ -131,8 +131,8 @@ static void note_defaults(struct options *all, const void *request)
 {
 	for (int i = 0; i < all->own; i++)
 		if (strstr(all->spec[i]->help, "%s"))
-			value_text(all->spec[i], (const char *)request + all->spec[i]->at, all->usual[i],
-			           sizeof *all->usual);
+			value_text(all->spec[i], (const char *)request + all->spec[i]->at,
+			           all->usual[i], sizeof *all->usual);
 }
 
 static void print_option(const struct option_spec *o, const char *usual, int width)
@@ -552,7 +552,8 @@ char *options_history(const struct cli *c, const char *before, struct err *e)
 	for (int i = 0; i < all.n; i++) {
 		const struct option_spec *o = all.spec[i];
 		if (o->role == OPTION_ASIDE)
-			aside[n++] = (struct history_option){ o->letter, o->name, o->argument != NULL };
+			aside[n++] = (struct history_option){ o->letter, o->name,
+			                                      o->argument != NULL };
 	}
 	aside[n] = (struct history_option){ 0, NULL, 0 };
 	return file_history_append(before, c->argc, c->argv, aside, e);

@@ -82,7 +82,8 @@ int options_given(const struct cli *c, const char *name);
 /* Adds all that determines the output, as the request has it. */
 void options_digest(const struct cli *c, const void *request, struct digest *d);
 
-/* `before` (may be NULL) followed by a line for this command line, as file_history_append has it. */
+/* `before` (may be NULL) followed by a line for this command line, as file_history_append has
+ * it. */
 char *options_history(const struct cli *c, const char *before, struct err *e);
 
 #endif
