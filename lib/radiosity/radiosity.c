@@ -123,9 +123,9 @@ static void count_work(struct shooter *v)
  * one has to be over before there is any rate. */
 enum { SWEEPS = 2 };
 
-/* Sweeps still to go, by that rate, beyond which overshooting is worth it. GMRES takes a pass
- * for each digit or so and up to BASIS_MAX of them (gmres.c), each of one sweep: half of these.
- * A guess; `shoot --log` in a scene of albedos near 1 shows what it does. */
+/* Sweeps still to go, by that rate, beyond which overshooting is worth it: half of the passes
+ * that it may take (BASIS_MAX in gmres.c). A guess; `shoot --log` in a scene of albedos near 1
+ * shows what it does. */
 enum { WORTH = 20 };
 
 /* Whether shots would go on for longer than overshooting takes. */
