@@ -45,7 +45,7 @@ static void side_flags(struct ff_job *j, uint32_t ps)
 	j->lobes += j->has_lobe[ps];
 	j->is_ideal[ps] = bsdf_has_ideal(mt, material, side, 0) ||
 	                  bsdf_has_ideal(mt, material, side, 1);
-	j->has_panes |= bsdf_has_ideal(mt, material, side, 1);
+	j->lights.panes |= bsdf_has_ideal(mt, material, side, 1);
 	j->has_ideal |= j->is_ideal[ps];
 	j->is_source[ps] = j->shoots_diffuse[ps] || j->shoots_lobe[ps] ||
 	                   bsdf_has_lobe(mt, material, side, 0) ||
@@ -90,7 +90,9 @@ int ff_job_init(struct ff_job *j, const struct model *m, const struct ff_options
 	for (uint32_t ps = 0; ps < 2 * m->patch.n; ps++)
 		side_flags(j, ps);
 	ff_element_table(j);
-	return ray_light_images_new(m, ray_offset(j->rays), 1, SIZE_MAX, 0, &j->images, e);
+	j->lights.m = m;
+	j->lights.rays = j->rays;
+	return ray_light_images_new(m, ray_offset(j->rays), 1, SIZE_MAX, 0, &j->lights.images, e);
 }
 
 int ff_job_prepare(struct ff_job *j, int patches, struct err *e)
@@ -113,7 +115,7 @@ void ff_job_free(struct ff_job *j)
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
-	ray_light_images_free(&j->images);
+	ray_light_visibility_free(&j->lights);
 	ray_locator_free(&j->locator);
 	ff_tally_places_free(&j->places);
 	ff_reciprocal_free(&j->reciprocal);

@@ -38,8 +38,6 @@ struct lit {
 struct look {
 	const struct lights *l; /* with their images */
 	size_t light;           /* of these */
-	size_t original;        /* that it is an image of */
-	const struct mirror_plane *mirror; /* NULL: the light itself */
 	uint32_t column;
 	double normal[3];
 	double clear;           /* rays end so far before the light */
@@ -82,8 +80,7 @@ static void look_from(struct ff_thread *t, struct look *k, const double x[3])
 	k->squares[0] += all * all;
 	if (w > 0) {
 		ray_leave(t->job->rays, k->normal, from);
-		chain = k->mirror ? ff_light_mirrored(t, k->mirror, k->original, from, s.toward)
-		                  : ff_light_straight(t, from, s.to);
+		chain = ff_light_chain(t, k->light, from, &s);
 	}
 	if (chain == CHAIN_NONE) {
 		k->none++;
@@ -179,8 +176,8 @@ static void light_element(struct ff_thread *t, const struct look *from, uint32_t
 static void light_elements(struct ff_thread *t, size_t light)
 {
 	const struct ff_job *j = t->job;
-	const struct light_images *g = &j->images;
-	struct look k = { .l = &g->l, .clear = ray_offset(j->rays), .original = light,
+	const struct light_images *g = &j->lights.images;
+	struct look k = { .l = &g->l, .clear = ray_offset(j->rays),
 	                  .seed = rng_mix(j->o.seed ^ rng_mix(light)) };
 
 	t->lit.n = 0;
@@ -188,7 +185,6 @@ static void light_elements(struct ff_thread *t, size_t light)
 		if (g->origin[i] != light)
 			continue;
 		k.light = i;
-		k.mirror = g->plane[i] < 0 ? NULL : &g->mirrors.plane[g->plane[i]];
 		for (uint32_t el = 0; el < j->m->element.n; el++)
 			light_element(t, &k, el);
 	}
@@ -311,7 +307,7 @@ int ff_light_incident(struct ff_thread *t, uint32_t ps, struct err *e)
 				c.l[k] = s.toward[k];
 			}
 			ray_leave(j->rays, n, from);
-			c.chain = ff_light_straight(t, from, s.to);
+			c.chain = ff_light_chain(t, light, from, &s);
 			if (c.chain != CHAIN_NONE && mem_append(&t->incident, &c, 1, sizeof c, e))
 				return -1;
 		}

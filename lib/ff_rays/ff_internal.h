@@ -9,7 +9,7 @@
 #include "lib/ff_tally/tally.h"
 #include "lib/hemicube/hemicube.h"
 #include "lib/ray/locate.h"
-#include "lib/ray/mirror.h"
+#include "lib/ray/light_visibility.h"
 #include "lib/ray/ray.h"
 
 /* FF_CLOSE_RAYS: a power of two that an element close to an emitter casts.
@@ -69,8 +69,8 @@ struct ff_job {
 	uint8_t *is_source;       /* [2P] any light leaves here */
 	uint32_t chain_most;      /* where counts of ideal events of a colour stop */
 	uint32_t lobes;           /* patch-sides that have one */
-	int has_panes, has_ideal; /* any clear pane; any ideal surface */
-	struct light_images images; /* in one mirror each */
+	int has_ideal;            /* any ideal surface */
+	struct light_visibility lights; /* with images in one mirror each */
 	double small_area;        /* elements below gather with a quarter of the rays: what they
 	                             lack weighs little */
 	struct ff_samples of_rows, of_reciprocal, of_small;

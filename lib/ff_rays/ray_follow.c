@@ -119,7 +119,7 @@ static int land(struct ff_thread *t, const struct flight *f, const struct ray_hi
 	const struct ff_job *j = t->job;
 
 	t->rays++;
-	int straight = t->bent_only && f->bends <= (j->images.mirrors.n > 0);
+	int straight = t->bent_only && f->bends <= (j->lights.images.mirrors.n > 0);
 	t->turned += t->bent_only && !straight ? f->w : 0;
 	if (hit->triangle == RAY_MISS) {
 		if (!f->tallied)

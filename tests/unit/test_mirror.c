@@ -2,7 +2,9 @@
 #include <math.h>
 
 #include "lib/base/vec3.h"
+#include "lib/data/punctual.h"
 #include "lib/ray/light_visibility.h"
+#include "lib/ray/ray.h"
 #include "tests/unit/fixtures/check.h"
 #include "tests/unit/fixtures/grid.h"
 
