@@ -7,6 +7,8 @@
 
 #include "lib/base/mem.h"
 
+/* LANES: doubles of an AVX2 register. CHANNELS_MAX: a count; BANDS_MAX bands of 12 light groups,
+ * or 3 of 128; arrays of so many stand on the stack. A guess at what scenes need. */
 enum { LANES = 4, CHANNELS_MAX = 384, VECTORS_MAX = CHANNELS_MAX / LANES };
 
 /* For loops that are to be made anew for each set of constants. */

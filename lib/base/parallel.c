@@ -8,6 +8,7 @@
 #include <xmmintrin.h>
 #endif
 
+/* A count, that of -j at most: threads stand in an array on the stack. */
 enum { MAX_THREADS = 256 };
 
 struct loop {

@@ -7,7 +7,8 @@
 #include "lib/base/index_check.h"
 #include "lib/base/mem.h"
 
-/* How well stored rows close: far above rounding, far below any real error. */
+/* How well stored rows close: far above rounding, far below any real error.
+ * A fraction of a row; a guess. */
 static const double closure_slack = 1e-9;
 /* Directions are float32. */
 static const double unit_slack = 1e-3;

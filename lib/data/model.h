@@ -8,6 +8,7 @@
 #include "lib/base/err.h"
 
 enum { FRONT = 0, BACK = 1 };
+/* A count: arrays of so many doubles stand on the stack. A guess, spectra by steps of 12 nm. */
 enum { BANDS_MAX = 32 };
 
 /* Which Phong lobe finite exponents mean (see lobe.h). */

@@ -26,6 +26,9 @@
 #include "lib/scatter/bsdf.h"
 #include "lib/scatter/lobe.h"
 
+/* Counts, of rays where nothing else is said. What was tried is in tests/bench/lobes.py, which measures
+ * the error that links bring in scenes of several lobes; the values themselves are guesses that
+ * it did not speak against. */
 enum {
 	MIN_LOBE_RAYS = 16, MIN_EMITTER_RAYS = 64, /* for any one link and lobe */
 	BIN_RAYS = 64,

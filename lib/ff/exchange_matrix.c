@@ -9,6 +9,11 @@
 #include "lib/ff_tally/closure.h"
 #include "lib/occlusion/exchange.h"
 
+/* BAND_BYTES: memory of the rows at work; a guess, small beside a machine's and large beside a
+ * row. ROWS_AT_A_TIME: a batch of the file. TILE x TILE pairs of facets at a time stay in the
+ * cache. Rays of a row's rest, and of a pair with a crowd between: guesses, whose noise the row's
+ * error states. CERTAIN: stated errors beyond which a sum is surely off. `make bench-form-factors`
+ * measures time and error of them all. */
 enum { BAND_BYTES = 192 << 20, ROWS_AT_A_TIME = 64, TILE = 32, REST_RAYS = 256,
        CROWD_RAYS = 1024, CERTAIN = 4 };
 

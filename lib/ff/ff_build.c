@@ -12,6 +12,7 @@
 #include "lib/ff/row_reciprocal.h"
 #include "lib/ff_rays/ray_budget.h"
 
+/* A count; a guess: enough for all threads, and few enough for batches to stay in memory. */
 enum { PATCHES_AT_A_TIME = 64 };
 
 /* ---- the loop over patches, and then lights ---- */

@@ -9,9 +9,11 @@
 #include "lib/ff_rays/sobol_points.h"
 #include "lib/scatter/bsdf.h"
 
-enum { FORMULA_EVALUATIONS = 1000, FORMULA_BODIES = 8 };
+/* Counts, for a pair of a patch-side and an element: evaluations of what is partly hidden, and
+ * occluders between, beyond which rays do as well. Guesses. */
+enum { FORMULA_EVALUATIONS = 1000, FORMULA_OCCLUDERS = 8 };
 
-/* Of what nothing hides, by formula to elements: finer than any picture shows. */
+/* Of what nothing hides, by formula to elements, relative: finer than any picture shows. A guess. */
 static const double FORMULA_ERROR = 1e-5;
 
 /* ---- what leaves which side ---- */
@@ -128,7 +130,7 @@ void ff_job_free(struct ff_job *j)
 int ff_thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e)
 {
 	const struct exchange_options o = { FORMULA_ERROR, j->o.target, FORMULA_EVALUATIONS,
-	                                    FORMULA_BODIES, 0 };
+	                                    FORMULA_OCCLUDERS, 0 };
 
 	*t = (struct ff_thread){ .job = j };
 	if (ff_tally_init(&t->tally, j->m, &j->places, j->has_lobe, j->chain_most, e))

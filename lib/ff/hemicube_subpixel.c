@@ -7,7 +7,8 @@
 #include "lib/base/vec3.h"
 #include "lib/ff_rays/ray_samples.h"
 
-enum { ENOUGH = 2048 }; /* pixels, of all hemicubes, that show an element as well as lines do */
+/* Pixels, of all hemicubes, that show an element as well as lines do: a count; a guess. */
+enum { ENOUGH = 2048 };
 
 /* Form factor per area of light from the points to the middle of an element-side. */
 static double seen_of(struct ff_thread *t, uint32_t ps, uint32_t column)

@@ -10,21 +10,27 @@
 #include "lib/ff_rays/ray_samples.h"
 #include "lib/geometry/solid_angle.h"
 
+/* Pairs of points for an element, counts: more than 1024 are not worth it beside the noise of other
+ * light, and 64 tell how many there should be. Guesses. */
 enum { MOST_PAIRS = 1024, PILOT_PAIRS = 64 };
 
 /* Of a close element's rays, if so many may meet the source they are as good as directions
- * to it, and less work. */
+ * to it, and less work.
+ * A fraction of the rays; a guess. */
 static const double plenty = .04;
 
-/* Below this solid angle a triangle is far enough for points of it by area, sr. */
+/* Below this solid angle, sr, a triangle is far enough for points of it by area: directions by
+ * solid angle then lose digits to cancellation. A guess. */
 static const double tiny = 1e-4;
 
 /* An element-side is tried for sure if it would be met by one in so many rays; a fainter
- * one by chance, which keeps the expectation. */
+ * one by chance, which keeps the expectation.
+ * Rays; a guess. */
 static const double faint = .25;
 
 /* ... and is worth a formula if by as many rays, or, however small it is, if the source is
- * as much of what it can see. */
+ * as much of what it can see.
+ * Rays, and a form factor; guesses. */
 static const double worth = 1, much = 1e-5;
 
 /* The form factor per area between two points. */

@@ -16,6 +16,7 @@
 #include "lib/ff_rays/ray_samples.h"
 #include "lib/scatter/lobe.h"
 
+/* Counts; the last two are guesses. */
 enum {
 	GROUPS = 4,               /* of sample points, whose spread gives the error */
 	CAPTURES = 4096,          /* light paths kept of a directional patch-side */

@@ -18,6 +18,7 @@
 #include "lib/geometry/solid_angle.h"
 #include "lib/scatter/bsdf.h"
 
+/* Counts; guesses. tests/unit/test_lights.c holds the errors stated with them. */
 enum {
 	POINTS_FIRST = 32,      /* that look from an element; all if they differ */
 	POINTS_LEAST = 256,

@@ -18,10 +18,12 @@
 /* An element's own rays tell what a patch-side sends it, if its area is small beside the
  * patch's, and if of rays between them so many are the element's, beside those that the
  * row casts: they are stratified over all that the element sees, so fewer do. A large
- * element is better told by the rays of a small patch. */
+ * element is better told by the rays of a small patch.
+ * Ratios; the commit that has them says that large elements keep their row's rays, nothing that
+ * was measured is left: guesses. */
 static const double larger = 2.2, enough = .11;
 
-/* How far the sum of gathered factors may be from what must land there. */
+/* How far the sum of reciprocal factors may be from what must land there, a fraction; a guess. */
 static const double misfit = .25;
 
 /* Of the rays of an element, as many as so many independent ones to the irradiance: they are
@@ -33,10 +35,10 @@ static double worth(uint32_t rays)
 	return fmax(1, 1.2 * pow(rays, .4));
 }
 
-/* Stated errors beyond which something is sure. */
+/* Stated errors beyond which something is sure: one in 16 000, if they are normal. */
 static const double certain = 4;
 
-/* Looking at an element from afar takes so much less time than a ray. */
+/* Looking at an element from afar takes so much less time than a ray; a guess. */
 enum { LOOKS_A_RAY = 4 };
 
 struct gatherer {

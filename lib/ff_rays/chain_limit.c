@@ -9,6 +9,7 @@
 #include "lib/ff_rays/ray_samples.h"
 #include "lib/scatter/lobe.h"
 
+/* Counts; guesses. */
 enum {
 	SIDES = 64, RAYS = 16,    /* patch-sides that send, and rays from each */
 	ROOM = 1 << 21,           /* blocks that all rows together may have */

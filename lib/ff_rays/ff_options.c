@@ -1,5 +1,7 @@
 #include "lib/ff_rays/ff_options.h"
 
+/* Counts, the defaults of ffcalc; what they cost and bring is in tests/bench/RESULTS.md (make
+ * report). An element gathers with at least 16 rays, four replicates of four. */
 enum { RAYS = 4096, HEMICUBE_PIXELS = 64, HEMICUBE_PIXELS_MAX = 8192, GATHER_LEAST = 16 };
 
 /* A sixteenth of the rays; formulas need some in any case. */

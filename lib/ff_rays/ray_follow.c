@@ -8,6 +8,8 @@
 
 /* ---- one ray ---- */
 
+/* How often a ray may go on both by a mirror and through a pane, a count; a guess: from there on one
+ * of the two is drawn, which bounds the work of a ray by 2^4 paths. */
 enum { MAX_SPLITS = 4 };
 
 struct flight {

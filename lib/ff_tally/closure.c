@@ -5,9 +5,11 @@
 
 #include "lib/base/mem.h"
 
+/* A count that ends what rounding might keep going in conjugate gradients; a guess. */
 enum { MOST_STEPS = 1000 };
 
-static const double small_enough = 1e-12; /* of the residual, relative */
+/* Of the residual, relative: near rounding of a sum of a thousand terms. */
+static const double small_enough = 1e-12;
 
 /* The normal equations: A[i][i] = sum of w of a row, A[i][j] = w of a pair, w = error^2,
  * scaled by the diagonal on both sides. */

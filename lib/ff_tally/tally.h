@@ -17,6 +17,8 @@ struct tally_places {
 /* A mark for element-sides where more happens than a count. */
 #define TALLY_APART 0x80000000u
 
+/* A count: from so many independent parts of a row's rays its standard error is known to 41 %.
+ * A guess at where more parts would stratify each too little. */
 enum { TALLY_REPLICATES = 4 };
 
 /* One thread's scratch space; a row at a time. */

@@ -2,7 +2,8 @@
 
 #include <stdlib.h>
 
-enum { FAR_MOST = 1 << 20 }; /* landings kept before equal ones are added up */
+/* Landings kept before equal ones are added up, a count; a guess. */
+enum { FAR_MOST = 1 << 20 };
 
 void ff_tally_chains_free(struct tally_chains *f)
 {

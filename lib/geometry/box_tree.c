@@ -5,7 +5,8 @@
 
 #include "lib/geometry/morton.h"
 
-enum { LEAF = 4 /* triangles */ };
+/* A count of triangles; a guess: as many as one look at a box costs. */
+enum { LEAF = 4 };
 
 struct place {
 	uint64_t code;

@@ -4,6 +4,7 @@
 #include "lib/base/vec3.h"
 #include "lib/geometry/point_polygon.h"
 
+/* A count: beyond it the halves are below rounding of the edge, 2^-53. */
 enum { DEEPEST = 48 };        /* bisections of an edge, towards a corner it nearly meets */
 
 double geo_contour_point(const double x[3], const double normal[3], int n, const double *v)

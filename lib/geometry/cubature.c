@@ -5,6 +5,7 @@
 
 typedef double four __attribute__((vector_size(32), aligned(8)));
 
+/* Points of each level's rule of a quadrilateral: 2 x 2, 8, 4 x 4, 6 x 6. */
 static const int level_points[CUBATURE_LEVELS] = { 4, 8, 16, 36 };
 
 /* Gauss-Legendre abscissae and weights on [-1, 1], the positive half. */

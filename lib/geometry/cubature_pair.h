@@ -32,6 +32,8 @@ struct cubature_pair_table {
 	double *row;          /* [PAIR_ONE / 4][n + 3] */
 };
 
+/* Doubles that geo_pair_one makes of a facet: so many rows of four facets are read by
+ * geo_pair_four. */
 enum { PAIR_ONE = 148 };
 
 int geo_pair_table_new(const struct facet *f, const struct cubature_pair *j, size_t n, double tolerance,

@@ -6,7 +6,8 @@
 
 #include <stddef.h>
 
-enum { FACET_CORNERS = 16 };  /* the most that a facet may have */
+/* The most corners that a facet may have, a count; a guess. Larger polygons are cut into several. */
+enum { FACET_CORNERS = 16 };
 
 struct facet {
 	int n;                /* corners */

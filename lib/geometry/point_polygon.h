@@ -5,7 +5,8 @@
 
 #include "lib/base/vec4.h"
 
-/* Each plane that cuts a convex polygon gives it a corner more, at most. */
+/* A count. Each plane that cuts a convex polygon gives it a corner more, at most: room for a facet
+ * of 16 corners and 64 cuts, as many as an occluder's outline has edges. */
 enum { POINT_POLYGON_CORNERS = 80 };
 
 struct point_polygon {

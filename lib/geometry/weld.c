@@ -9,7 +9,9 @@
 
 #define NOBODY UINT32_MAX
 
-enum { CELL = 8 /* tolerances */ };
+/* Edge of a cell, in tolerances. A guess: few points are so near a wall of their cell that its
+ * neighbours are looked at, and few cells hold two points. */
+enum { CELL = 8 };
 
 /* The points that stand for their likes, chained by hash bucket. */
 struct grid {

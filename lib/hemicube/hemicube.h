@@ -18,6 +18,7 @@
 #include "lib/data/model.h"
 
 #define HEMICUBE_VOID 0xffffffffu  /* a pixel that sees nothing; no element */
+/* Pixels along an edge, at most: so that numbers of pixels fit 32 bits and an item buffer memory. */
 enum { HEMICUBE_N_MAX = 8192 };
 
 /* What depends on the resolution alone. */

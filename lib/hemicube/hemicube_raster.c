@@ -19,6 +19,7 @@ typedef float v8f __attribute__((vector_size(32)));
 typedef int32_t v8i __attribute__((vector_size(32)));
 typedef uint32_t v8u __attribute__((vector_size(32)));
 
+/* Pixels; a guess, some steps of float32 at the size of the grid. */
 static const double THIN = 1e-7;
 
 /* 1/w = q0 + qx x + qy y over a triangle, (x, y) in pixels. */

@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 /* Triangles are clipped by a pyramid this many times as wide as the face: wide
- * enough that few need it. */
+ * enough that few need it. A guess. */
 #define HEMICUBE_GUARD 4.
 
 /* A face of one hemicube being drawn. */

@@ -10,6 +10,8 @@
 #include "lib/base/err.h"
 #include "lib/data/model.h"
 
+/* Counts: a cluster of 32 is drawn with its vertices in registers and cache. A guess;
+ * tests/bench/hemicube.c measures drawing. */
 enum { CLUSTER_TRIANGLES = 32, CLUSTER_VERTICES = 3 * CLUSTER_TRIANGLES };
 
 struct hemicube_cluster {
@@ -47,6 +49,7 @@ struct hemicube_scene {
 	struct hemicube_mesh elements, triangles; /* triangles may be empty */
 };
 
+/* Floats of an AVX2 register. */
 enum { HEMICUBE_LANES = 8 };
 
 /* A thread's scratch: vertices of one cluster, in the cube's frame and projected

@@ -16,13 +16,16 @@
 static const double left = .70710678118654752;
 
 /* What one step leaves of the energy, if more is asked for: the last of it would take elements
- * wherever there is any error at all. */
+ * wherever there is any error at all.
+ * A fraction; a guess. */
 static const double once = .4;
 
 /* Of the variance, what an estimate that has it subtracted may still be off by: that looks at
- * some ten second differences, which are larger than noise, and noise is far from even. */
+ * some ten second differences, which are larger than noise, and noise is far from even.
+ * One over a fraction; a guess, on the safe side of ten. */
 static const double doubtful = 100;
 
+/* Counts. BISECTIONS of a range of 1e12 find a bound to a double's 1e-12; the others are guesses. */
 enum {
 	ELEMENTS_A_PATCH = 5, /* at least, when it is halved */
 	HALVINGS_MAX = 4, /* in one step: to a quarter of the edge, as far as an estimate

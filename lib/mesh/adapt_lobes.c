@@ -13,10 +13,12 @@
 #include "lib/mesh/stages.h"
 
 /* Of the squared deviations in a patch, what arrives where all of its light is smeared by a
- * lobe: as in adapt_patches.c. */
+ * lobe: as in adapt_patches.c.
+ * A fraction; a guess. */
 static const double arriving = .1;
 
-/* Of the mean over patch-sides, the least deviation that is worth a look at all lobes. */
+/* Of the mean over patch-sides, the least deviation that is worth a look at all lobes.
+ * A fraction; a guess. */
 static const double notable = 1e-3;
 
 /* A patch-side with a lobe for light that arrives there. */

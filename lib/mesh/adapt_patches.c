@@ -12,10 +12,11 @@
 
 /* Of the squared deviations in a patch, what arrives at a surface that meets it at a right
  * angle, as large as itself: the irradiance there is off by half of them at the common edge,
- * and by hardly anything a patch away. */
+ * and by hardly anything a patch away.
+ * A fraction; a guess between that half and hardly anything. */
 static const double arriving = .1;
 
-/* Closer than so much of its size. */
+/* Closer than so much of its size, a fraction; a guess. */
 static const double reach = .25;
 
 struct search {

@@ -13,6 +13,7 @@
 
 #define NONE UINT32_MAX
 
+/* A count: element-sides then still fit 32 bits, and memory ends before. */
 enum { ELEMENTS_MAX = 1 << 28 };
 
 /* An element to be. Half-edge 3 leaf + k belongs to a doubly linked list of the

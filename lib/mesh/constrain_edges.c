@@ -9,6 +9,8 @@
 
 #include "lib/mesh/triangulation.h"
 
+/* Steps of a walk over the pieces of one triangle, beyond which rounding leads it in circles: many
+ * times the pieces that any triangle has had. A guess. */
 enum { STEPS_MAX = 100000 };
 
 /* ---- points ---- */

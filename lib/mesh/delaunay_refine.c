@@ -11,6 +11,8 @@
  * refinement is sure to end. */
 #define LEAST_SINE .342
 
+/* Counts, guesses that end what rounding might keep going: rounds of a triangle, steps of a walk;
+ * and a length. */
 enum {
 	ROUNDS_MAX = 64,
 	STEPS_MAX = 10000,

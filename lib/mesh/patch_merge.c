@@ -12,7 +12,9 @@
 
 #define NONE UINT32_MAX
 
-enum { CROWD = 8 /* uses of an edge beyond which it makes no neighbours */ };
+/* Uses of an edge beyond which it makes no neighbours, a count: pairs of them are looked at, and
+ * surfaces have two. A guess. */
+enum { CROWD = 8 };
 
 struct group {
 	double lo[3], hi[3];     /* in the region's frame */

@@ -9,7 +9,9 @@
 #include "lib/base/vec3.h"
 #include "lib/mesh/stages.h"
 
-enum { ELEMENTS_MIN = 4 }; /* of a patch that is halved, for each half */
+/* Elements of a patch that is halved, for each half, a count: fewer make halves whose shape says
+ * more of the elements than of the patch. A guess. */
+enum { ELEMENTS_MIN = 4 };
 
 /* Connected elements order[begin, end) of a region and the box, in its frame, that
  * they stand for. The box is halved exactly; elements that straddle the cut belong

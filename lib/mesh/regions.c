@@ -10,7 +10,8 @@
 #include "lib/geometry/half_edge.h"
 #include "lib/mesh/stages.h"
 
-enum { CROWD = 8 /* uses of an edge that are compared with one another */ };
+/* Uses of an edge that are compared with one another, a count; surfaces have two. A guess. */
+enum { CROWD = 8 };
 
 struct finder {
 	const struct model *m;

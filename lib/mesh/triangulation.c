@@ -3,8 +3,12 @@
 #include <math.h>
 #include <string.h>
 
-#define FLAT 1e-3 /* of the least distance: height of the flattest piece that flips make */
+/* Height of the flattest piece that flips make, as a fraction of the least distance between
+ * contacts: flatter ones have no normal that float32 vertices could tell. A guess. */
+#define FLAT 1e-3
 
+/* Counts. Flips end by themselves in exact arithmetic: passes beyond 64, a guess, are rounding that
+ * goes in circles. Three half-edges of so many pieces fit 32 bits. */
 enum { PASSES_MAX = 64, PIECES_MAX = 1 << 28 };
 
 void mesh_set_triangle(struct triangulation *c, uint32_t triangle)

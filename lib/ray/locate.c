@@ -5,6 +5,8 @@
 
 #include "lib/base/mem.h"
 
+/* Cells of a triangle's grid for each of its elements, and along an edge of it at most: counts,
+ * guesses. Most cells then lie within one element, and a grid takes at most 16 MB. */
 enum { CELLS_AN_ELEMENT = 16, SIZE_MAX_CELLS = 2048 };
 
 /* Cells along an edge of a triangle of k elements: a power of two, so that the

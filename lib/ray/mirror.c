@@ -8,7 +8,7 @@
 #include "lib/base/vec3.h"
 #include "lib/scatter/bsdf.h"
 
-/* Planes beyond which images cost more than rays. */
+/* Planes beyond which images cost more than rays, a count; a guess. */
 enum { PLANES_MOST = 16 };
 
 /* Corners have float32 coordinates: normals and, over the size of the scene, heights of

@@ -37,11 +37,12 @@ struct ray_scene {
 static const double offset_units = 0x1p-21;
 
 /* Up to how many triangles a packet of rays with similar directions is best traced as
- * one; in larger scenes its rays part too soon. */
+ * one; in larger scenes its rays part too soon. A count; measured by a
+ * loop of sorted rays: half as fast again with 36 triangles, no faster with 100 000. */
 enum { COHERENT_MOST = 1000 };
 
 /* Up to how many triangles a scene is built by one thread, in hundredths of a second: Embree's
- * others would go on looking for work for longer. */
+ * others would go on looking for work for longer. A count; a guess. */
 enum { ALONE_MOST = 20000 };
 
 enum { TRIANGLES, SLIVERS };  /* geometries */
@@ -316,6 +317,7 @@ struct ray_units ray_units(const struct ray_scene *s)
 	return (struct ray_units){ { s->centre[0], s->centre[1], s->centre[2] }, s->per_unit };
 }
 
+/* Rays that Embree takes at once: floats of an AVX2 register. */
 enum { PACKET = 8 };
 
 /* The parts of a packet that no ray changes, and those that a cast has changed. */

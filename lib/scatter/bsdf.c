@@ -18,6 +18,7 @@ struct part {
 	double k, chance;
 };
 
+/* Diffuse and lobe, reflected and transmitted. */
 enum { PARTS_MAX = 4 };
 
 /* The parts open to a known direction, with chances that sum to 1 (or n = 0). */

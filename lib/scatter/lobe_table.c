@@ -4,7 +4,8 @@
 
 #include "lib/scatter/lobe.h"
 
-/* Wider lobes have a normaliser that is not smooth at cosine 1. */
+/* Wider lobes have a normaliser that is not smooth at cosine 1.
+ * An exponent; tests/unit/test_lobe.c holds the table to 1e-5 from here on. */
 static const double sharp_from = 5;
 
 void bsdf_lobe_table_make(struct lobe_table *t, double k)

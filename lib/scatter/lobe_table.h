@@ -2,6 +2,7 @@
 #ifndef TWOPASS_LOBE_TABLE_H
 #define TWOPASS_LOBE_TABLE_H
 
+/* Steps of the table, a count; a guess, and tests/unit/test_lobe.c holds its error. */
 enum { LOBE_TABLE = 64 };
 
 struct lobe_table {
