@@ -5,7 +5,7 @@
 
 #include "formats/gltf/gltf_doc.h"
 #include "lib/base/constants.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 enum { RGB = 3 };
 

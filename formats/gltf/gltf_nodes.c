@@ -5,7 +5,7 @@
 
 #include "formats/gltf/gltf_doc.h"
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 /* Columns of a matrix count as dependent when the volume that they span as unit
  * vectors is below this: far above the rounding of a product of matrices in float64, far below

@@ -7,7 +7,7 @@
 
 #include "formats/gltf/gltf_doc.h"
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/data/camera_pose.h"
 
 struct scene {

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "lib/base/mem.h"
+#include "lib/base/vec.h"
 
 /* LANES: doubles of an AVX2 register. CHANNELS_MAX: a count; BANDS_MAX bands of 12 light groups,
  * or 3 of 128; arrays of so many stand on the stack. A guess at what scenes need. */
@@ -16,7 +17,6 @@ enum { LANES = 4, CHANNELS_MAX = 384, VECTORS_MAX = CHANNELS_MAX / LANES };
 
 typedef double lanes __attribute__((vector_size(32)));
 typedef float lanes_f32 __attribute__((vector_size(16)));
-typedef long long lanes_mask __attribute__((vector_size(32)));
 
 /* Vectors that hold so many channels. */
 static inline size_t lanes_vectors(size_t channels)
@@ -60,36 +60,20 @@ static inline double lanes_total(const lanes *x, size_t n)
 	return sum[0] + sum[1] + sum[2] + sum[3];
 }
 
-static inline lanes lanes_abs(lanes x)
-{
-	return (lanes)((lanes_mask)x & INT64_MAX);
-}
-
 /* x, or 0 where not `yes`, without a branch. */
 static inline lanes lanes_if(lanes x, int yes)
 {
-	return (lanes)((lanes_mask)x & -(long long)yes);
-}
-
-static inline lanes lanes_all(double x)
-{
-	return (lanes){ x, x, x, x };
-}
-
-/* Lanes of a where the mask that a comparison gave is set, else those of b. */
-static inline lanes lanes_choose(lanes_mask mask, lanes a, lanes b)
-{
-	return (lanes)((mask & (lanes_mask)a) | (~mask & (lanes_mask)b));
+	return (lanes)((four_mask)x & -(long long)yes);
 }
 
 static inline lanes lanes_min(lanes a, lanes b)
 {
-	return lanes_choose(a < b, a, b);
+	return four_choose(a < b, a, b);
 }
 
 static inline lanes lanes_max(lanes a, lanes b)
 {
-	return lanes_choose(a > b, a, b);
+	return four_choose(a > b, a, b);
 }
 
 /* Sum of the absolute values of n vectors. */
@@ -98,7 +82,7 @@ static inline double lanes_magnitude(const lanes *x, size_t n)
 	lanes sum = { 0 };
 
 	for (size_t i = 0; i < n; i++)
-		sum += lanes_abs(x[i]);
+		sum += four_abs(x[i]);
 	return sum[0] + sum[1] + sum[2] + sum[3];
 }
 

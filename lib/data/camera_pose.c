@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "lib/base/constants.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 int model_camera_pose(const double affine[16], double to_world[16])
 {

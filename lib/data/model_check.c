@@ -8,7 +8,7 @@
 #include "lib/base/constants.h"
 #include "lib/base/index_check.h"
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 static const double albedo_slack = MODEL_ALBEDO_SLACK;
 /* Rigid matrices come from float32 glTF numbers. */

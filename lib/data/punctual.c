@@ -5,7 +5,7 @@
 
 #include "lib/base/constants.h"
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 static void find_box(struct model *m)
 {

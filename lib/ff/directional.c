@@ -19,7 +19,7 @@
 #include <string.h>
 
 #include "lib/base/constants.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/ff/row_light.h"
 #include "lib/ff_rays/ray_follow.h"
 #include "lib/ff_rays/ray_samples.h"

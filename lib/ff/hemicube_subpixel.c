@@ -4,7 +4,7 @@
 #include "lib/ff/hemicube_subpixel.h"
 
 #include "lib/base/constants.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/ff_rays/ray_samples.h"
 
 /* Pixels, of all hemicubes, that show an element as well as lines do: a count; a guess. */

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "lib/base/constants.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/ff_rays/ray_samples.h"
 #include "lib/geometry/solid_angle.h"
 

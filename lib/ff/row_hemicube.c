@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "lib/base/constants.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/ff/directional.h"
 #include "lib/ff/hemicube_subpixel.h"
 #include "lib/ff_rays/ray_follow.h"

@@ -10,7 +10,7 @@
 
 #include <math.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/data/punctual.h"
 #include "lib/ff_rays/light_paths.h"
 #include "lib/ff_rays/ray_follow.h"

@@ -2,7 +2,7 @@
  * position on the patch (Owen-scrambled Sobol points in four dimensions). */
 #include "lib/ff/row_rays.h"
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/ff/directional.h"
 #include "lib/ff/row_reciprocal.h"
 #include "lib/ff_rays/ray_budget.h"

@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/ff/row_emitter.h"
 #include "lib/ff_rays/ray_budget.h"
 #include "lib/ff_rays/ray_samples.h"

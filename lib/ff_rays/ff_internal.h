@@ -12,8 +12,9 @@
 #include "lib/ray/light_visibility.h"
 #include "lib/ray/ray.h"
 
-/* FF_CLOSE_RAYS: a power of two that an element close to an emitter casts.
- * FF_HALVINGS: the most of a row's rays. */
+/* Counts. FF_CLOSE_RAYS: a power of two that an element close to an emitter casts.
+ * FF_HALVINGS: the most of a row's rays, down to an eighth. Both are guesses; the errors stated
+ * with them are measured by tests/tools/stated_errors.t. */
 enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048,
        FF_HALVINGS = 3 };
 

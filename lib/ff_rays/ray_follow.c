@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/ff_rays/ray_samples.h"
 #include "lib/scatter/lobe.h"
 

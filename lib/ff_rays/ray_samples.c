@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "lib/base/constants.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 /* From the centre of a triangle to its farthest corner, by the edges from one corner. */
 static double reach(const double a[4], const double b[4])

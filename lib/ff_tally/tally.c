@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 struct tally_arrival {
 	uint32_t slot, target;

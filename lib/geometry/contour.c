@@ -1,7 +1,7 @@
 #include "lib/geometry/contour.h"
 
 #include "lib/base/constants.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/geometry/point_polygon.h"
 
 /* A count: beyond it the halves are below rounding of the edge, 2^-53. */

@@ -1,9 +1,7 @@
 #include "lib/geometry/cubature.h"
 
 #include "lib/base/constants.h"
-#include "lib/base/vec3.h"
-
-typedef double four __attribute__((vector_size(32), aligned(8)));
+#include "lib/base/vec.h"
 
 /* Points of each level's rule of a quadrilateral: 2 x 2, 8, 4 x 4, 6 x 6. */
 static const int level_points[CUBATURE_LEVELS] = { 4, 8, 16, 36 };

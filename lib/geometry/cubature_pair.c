@@ -7,8 +7,7 @@
 
 #include "lib/base/constants.h"
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
-#include "lib/base/vec4.h"
+#include "lib/base/vec.h"
 
 /* In [-1, 1]^4 the 16 points (+-c, +-c, +-c, +-c) and the 8 points +-e on an axis: with these
  * weights the means of 1, u^2, u^4 and u^2 v^2 are 1, 1/3, 1/5 and 1/9, as they should be, so

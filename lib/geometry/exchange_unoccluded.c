@@ -1,6 +1,6 @@
 #include "lib/geometry/exchange_unoccluded.h"
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/geometry/contour.h"
 
 void geo_unoccluded_init(struct unoccluded *x, double relative)

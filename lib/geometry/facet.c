@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 /* Centre and radius; twice the area vector. */
 static void spread(struct facet *f, double twice[3])

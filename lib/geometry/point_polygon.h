@@ -3,7 +3,7 @@
 #ifndef TWOPASS_POINT_POLYGON_H
 #define TWOPASS_POINT_POLYGON_H
 
-#include "lib/base/vec4.h"
+#include "lib/base/vec.h"
 
 /* A count. Each plane that cuts a convex polygon gives it a corner more, at most: room for a facet
  * of 16 corners and 64 cuts, as many as an occluder's outline has edges. */

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 static void towards(const double *v, const double x[3], double to[3][3])
 {

@@ -5,7 +5,7 @@
 
 #include "lib/base/constants.h"
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/hemicube/hemicube_scene.h"
 
 /* Antiderivatives (in both face coordinates) of the solid angle and of the form

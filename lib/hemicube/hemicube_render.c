@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/hemicube/hemicube.h"
 #include "lib/hemicube/hemicube_raster.h"
 #include "lib/hemicube/hemicube_scene.h"

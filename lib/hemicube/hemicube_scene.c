@@ -5,7 +5,7 @@
 #include <stdlib.h>
 
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/hemicube/hemicube.h"
 
 /* What is needed while clusters are formed. */

@@ -7,7 +7,7 @@
 #include "lib/base/constants.h"
 #include "lib/base/mem.h"
 #include "lib/base/parallel.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/data/solution.h"
 #include "lib/interpolate/smooth_groups.h"
 

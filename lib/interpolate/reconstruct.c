@@ -6,7 +6,7 @@
 
 #include "lib/base/mem.h"
 #include "lib/base/parallel.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/data/solution.h"
 #include "lib/interpolate/reconstruct_internal.h"
 

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 /* A fit is used if its variance at the vertex is at most this many times the variance of one
  * element: a sixth inside a regular grid, more where a function is drawn out beyond few
@@ -164,7 +164,7 @@ static inline struct channels fit_channels(const struct reconstruct_job *j,
                                            size_t v)
 {
 	const lanes none = { 0 };
-	lanes low = lanes_all((double)INFINITY), high = none, cx = none, cy = none, variance = none;
+	lanes low = four_all((double)INFINITY), high = none, cx = none, cy = none, variance = none;
 	struct channels c = { .mean = none, .slack = none };
 
 	for (size_t i = 0; i < f->n; i++) {
@@ -188,8 +188,8 @@ static inline struct channels fit_channels(const struct reconstruct_job *j,
 	if (f->n > 3) {
 		double free = (double)(f->n - 1) / (double)(f->n - 3);
 		lanes left = free * (1 - (c.gx * cx + c.gy * cy) / variance);
-		lanes part = clamp(1 - slack_by_unexplained * left, none, lanes_all(1));
-		c.slack = lanes_choose(variance > 0, part * (high - low), none);
+		lanes part = clamp(1 - slack_by_unexplained * left, none, four_all(1));
+		c.slack = four_choose(variance > 0, part * (high - low), none);
 	}
 	return c;
 }
@@ -199,7 +199,7 @@ static inline lanes clamped(const struct channels *c)
 	const lanes none = { 0 };
 	lanes value = clamp(c->value, lanes_max(none, c->low - c->slack), c->high + c->slack);
 
-	return lanes_choose(c->high > 0, value, none);
+	return four_choose(c->high > 0, value, none);
 }
 
 /* How far a fit is consistent with the elements' standard errors: 1 where its
@@ -219,7 +219,7 @@ static inline lanes consistency(const struct reconstruct_job *j,
 		          c->gy * (p->y - f->my);
 		chi2 += d * d * j->precision[p->element * j->vectors + v];
 	}
-	return clamp(inconsistent_from - chi2 / (double)(f->n - 3), none, lanes_all(1));
+	return clamp(inconsistent_from - chi2 / (double)(f->n - 3), none, four_all(1));
 }
 
 /* Area-weighted mean of the n elements at the vertex: what is left without a fit. */

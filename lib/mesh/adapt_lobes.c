@@ -9,7 +9,7 @@
 
 #include "lib/base/constants.h"
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/mesh/stages.h"
 
 /* Of the squared deviations in a patch, what arrives where all of its light is smeared by a

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/geometry/box_tree.h"
 #include "lib/mesh/imprint.h"
 #include "lib/scatter/bsdf.h"

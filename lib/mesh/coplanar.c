@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/geometry/box_tree.h"
 #include "lib/mesh/imprint.h"
 #include "lib/mesh/stages.h"

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/mesh/stages.h"
 
 /* Height over the longest edge below which a triangle has no area: what float32

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/mesh/stages.h"
 
 /* Which regions the elements belong to. */

@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/mesh/imprint.h"
 
 /* The triangles to be, by the input triangle they are part of. */

@@ -7,7 +7,7 @@
 
 #include "lib/base/mem.h"
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/mesh/stages.h"
 
 #define NONE UINT32_MAX

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/mesh/stages.h"
 
 /* Elements of a patch that is halved, for each half, a count: fewer make halves whose shape says

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/mesh/imprint.h"
 
 struct triangulation {

@@ -8,7 +8,7 @@
 #include "lib/base/mem.h"
 #include "lib/base/replicates.h"
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/data/punctual.h"
 #include "lib/geometry/contour.h"
 #include "lib/geometry/cubature.h"

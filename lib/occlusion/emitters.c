@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/occlusion/facet_set.h"
 #include "lib/occlusion/occluder_polygons.h"
 #include "lib/scatter/bsdf.h"

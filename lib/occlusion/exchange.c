@@ -4,7 +4,7 @@
 
 #include "lib/base/replicates.h"
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 void occ_exchanger_init(struct exchanger *x, const struct exchange_options *o,
                         const struct occluder_set *occluders, struct ray_scene *rays,

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/geometry/contour.h"
 #include "lib/geometry/cubature.h"
 #include "lib/occlusion/shadow_edges.h"

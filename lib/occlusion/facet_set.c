@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 void occ_facet_centre(const struct model *m, double centre[3])
 {

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/geometry/half_edge.h"
 #include "lib/occlusion/occluder_inside.h"
 #include "lib/occlusion/occluder_polygons.h"

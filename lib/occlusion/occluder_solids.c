@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/geometry/half_edge.h"
 
 /* Corners of a solid may be above its faces by so many times the height that counts as none: a face

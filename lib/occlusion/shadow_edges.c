@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/occlusion/occluder_polygons.h"
 
 /* Up to how many occluders it pays to look for bends, and where the shadows of two meet, a count:

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/occlusion/occluder_polygons.h"
 
 /* A box is flat up to so many times the height that counts as none. A guess. */

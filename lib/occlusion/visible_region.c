@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/occlusion/occluder_polygons.h"
 
 /* Up to how many occluders that hide parts of a polygon what they hide is taken off, and what they

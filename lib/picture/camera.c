@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "lib/base/constants.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 /* The sine of the angle between view and up direction below which the picture's upright is
  * rounding. A guess. */

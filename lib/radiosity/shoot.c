@@ -155,7 +155,7 @@ static ALWAYS_INLINE double count_as(struct shooter *v, uint32_t source, const l
 	for (size_t k = 0; k < items; k++, flux += n) {
 		lanes sum = { 0 };
 		for (size_t i = 0; i < n; i++) {
-			lanes magnitude = lanes_abs(flux[i]), weighted = magnitude * weight[i];
+			lanes magnitude = four_abs(flux[i]), weighted = magnitude * weight[i];
 			all[i] += flux[i];
 			part[i] += weighted;
 			sum += weighted;
@@ -214,7 +214,7 @@ static inline double weigh(const lanes *weight, const lanes *flux, size_t n)
 	lanes sum = { 0 };
 
 	for (size_t i = 0; i < n; i++)
-		sum += lanes_abs(flux[i]) * weight[i];
+		sum += four_abs(flux[i]) * weight[i];
 	return lanes_total(&sum, 1);
 }
 

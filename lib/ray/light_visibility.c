@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/data/model.h"
 #include "lib/data/punctual.h"
 #include "lib/ray/ray.h"

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/scatter/bsdf.h"
 
 /* Planes beyond which images cost more than rays, a count; a guess. */

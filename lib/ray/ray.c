@@ -17,7 +17,7 @@
 #endif
 
 #include "lib/base/mem.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 struct ray_scene {
 	RTCDevice device;

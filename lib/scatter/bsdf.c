@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "lib/base/constants.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/scatter/lobe.h"
 
 /* A direction whose cosine is smaller than rounding of the dot product lies in

@@ -5,7 +5,7 @@
 
 #include "lib/base/constants.h"
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 double bsdf_lobe_power(double k, double cos_gamma)
 {

@@ -7,7 +7,7 @@
 #include "lib/base/constants.h"
 #include "lib/base/mem.h"
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/geometry/half_edge.h"
 #include "lib/interpolate/smooth_groups.h"
 #include "lib/view/final_gather_rays.h"

@@ -8,7 +8,7 @@
 #include "lib/base/mem.h"
 #include "lib/base/replicates.h"
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 /* Counts of rays, powers of two, which Sobol points fill evenly. Guesses but for AT_ONCE. */
 enum {

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/scatter/lobe.h"
 
 /* Rays of less weight, relative to one that has met nothing directional, are followed by as much

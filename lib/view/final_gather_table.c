@@ -4,7 +4,7 @@
 
 #include "lib/base/mem.h"
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/data/solution.h"
 
 /* A side is rough where interpolation misses so much of its irradiance, by what the solution

@@ -5,7 +5,7 @@
 
 #include "lib/base/replicates.h"
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/scatter/lobe.h"
 #include "lib/view/shade_tile.h"
 

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "lib/base/constants.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/scatter/lobe.h"
 
 double view_lobe_per_density(const struct view_lobe_seen *l, enum lobe_kind kind, double cos_i)

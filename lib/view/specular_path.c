@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/scatter/bsdf.h"
 #include "lib/scatter/lobe.h"
 #include "lib/view/glossy.h"

@@ -12,7 +12,7 @@
 
 #include "formats/cache/mesh_file.h"
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/hemicube/hemicube.h"
 
 static double seconds(void)

@@ -22,7 +22,7 @@
 #include "lib/base/mem.h"
 #include "lib/base/parallel.h"
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/picture/camera.h"
 #include "lib/scatter/lobe.h"
 

@@ -8,7 +8,7 @@
 #include "tests/unit/fixtures/grid.h"
 
 #include "lib/base/constants.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/occlusion/direct.h"
 
 struct stage {

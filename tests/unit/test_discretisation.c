@@ -9,7 +9,7 @@
 #include "tests/unit/fixtures/grid.h"
 
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/interpolate/discretisation.h"
 #include "lib/interpolate/reconstruct.h"
 

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/hemicube/hemicube.h"
 #include "tests/unit/fixtures/check.h"
 

@@ -4,7 +4,7 @@
 
 #include "lib/base/constants.h"
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/data/punctual.h"
 #include "lib/occlusion/direct.h"
 #include "lib/radiosity/radiosity.h"

@@ -3,7 +3,7 @@
 
 #include "lib/base/constants.h"
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/scatter/lobe.h"
 #include "lib/scatter/lobe_table.h"
 #include "tests/unit/fixtures/check.h"

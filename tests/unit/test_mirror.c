@@ -1,7 +1,7 @@
 /* Images of punctual lights in plane mirrors, against closed forms. */
 #include <math.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/data/punctual.h"
 #include "lib/ray/light_visibility.h"
 #include "lib/ray/ray.h"

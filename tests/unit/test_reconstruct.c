@@ -9,7 +9,7 @@
 #include "tests/unit/fixtures/grid.h"
 
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/interpolate/reconstruct.h"
 
 static const double origin[3] = { 0, 0, 0 }, x1[3] = { 1, 0, 0 }, y1[3] = { 0, 1, 0 };

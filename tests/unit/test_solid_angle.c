@@ -4,7 +4,7 @@
 
 #include "lib/base/constants.h"
 #include "lib/base/rng.h"
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/geometry/solid_angle.h"
 #include "tests/unit/fixtures/check.h"
 

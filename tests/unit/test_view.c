@@ -8,7 +8,7 @@
 
 #include "tests/unit/fixtures/stage.h"
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 
 /* A closed box of irradiance 1: diffuse and mirror walls, and across its middle a
  * sheet that does everything. Everything must look 1 / pi bright. */

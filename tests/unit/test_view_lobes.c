@@ -8,7 +8,7 @@
 
 #include "tests/unit/fixtures/stage.h"
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/scatter/bsdf.h"
 #include "lib/scatter/lobe.h"
 

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "lib/base/vec3.h"
+#include "lib/base/vec.h"
 #include "lib/picture/camera.h"
 #include "tests/unit/fixtures/check.h"
 

@@ -1,8 +1,10 @@
-/* Three-vectors in double precision. */
-#ifndef TWOPASS_VEC3_H
-#define TWOPASS_VEC3_H
+/* Three-vectors in double precision (v3_), and vectors of four doubles, a register (four_). */
+#ifndef TWOPASS_VEC_H
+#define TWOPASS_VEC_H
 
+#include <immintrin.h>
 #include <math.h>
+#include <stdint.h>
 
 static inline double v3_dot(const double a[3], const double b[3])
 {
@@ -65,6 +67,52 @@ static inline void v3_area(const double a[3], const double b[3], const double c[
 	v3_cross(u, v, out);
 	for (int k = 0; k < 3; k++)
 		out[k] *= .5;
+}
+
+/* ---- four doubles ---- */
+
+typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+typedef long long four_mask __attribute__((vector_size(32), aligned(8), may_alias));
+
+static inline four four_load(const double *x)
+{
+	return *(const four *)x;
+}
+
+static inline void four_store(double *x, four a)
+{
+	*(four *)x = a;
+}
+
+static inline four four_all(double x)
+{
+	return (four){ x, x, x, x };
+}
+
+static inline four four_choose(four_mask mask, four yes, four no)
+{
+	return (four)((mask & (four_mask)yes) | (~mask & (four_mask)no));
+}
+
+static inline four four_abs(four a)
+{
+	return (four)((four_mask)a & INT64_MAX);
+}
+
+static inline four four_sqrt(four a)
+{
+	return (four)_mm256_sqrt_pd((__m256d)a);
+}
+
+/* A bit for each that is set. */
+static inline int four_bits(four_mask mask)
+{
+	return _mm256_movemask_pd((__m256d)mask);
+}
+
+static inline double four_sum(four a)
+{
+	return (a[0] + a[1]) + (a[2] + a[3]);
 }
 
 #endif
