@@ -5,7 +5,9 @@
 
 #include "lib/geometry/morton.h"
 
-enum { LEAF = 4 /* triangles */ };
+/* Triangles in a leaf, at most: fewer make more nodes, more make more tests a visit. A guess;
+ * neither what is found nor its order depends on it. */
+enum { LEAF = 4 };
 
 struct place {
 	uint64_t code;

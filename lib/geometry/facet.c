@@ -150,5 +150,6 @@ void geo_facet_point(const struct facet *f, double u, double v, double x[3])
 		u -= area[i];
 	double r = sqrt(fmin(1, u / area[i]));
 	for (int k = 0; k < 3; k++)
-		x[k] = (1 - r) * f->v[k] + r * ((1 - v) * f->v[3 * i + k] + v * f->v[3 * i + 3 + k]);
+		x[k] = (1 - r) * f->v[k] +
+		       r * ((1 - v) * f->v[3 * i + k] + v * f->v[3 * i + 3 + k]);
 }

@@ -9,7 +9,9 @@
 
 #define NOBODY UINT32_MAX
 
-enum { CELL = 8 /* tolerances */ };
+/* Side of a cell, in tolerances: wider cells hold more points to compare, narrower ones make
+ * more points look into several. A guess; the result does not depend on it. */
+enum { CELL = 8 };
 
 /* The points that stand for their likes, chained by hash bucket. */
 struct grid {

@@ -111,6 +111,7 @@ static uint32_t cover(const struct search *s, uint32_t t, uint32_t surface)
 		v3_mad(centre, 1. / 3, corner(s->m, t, k), centre);
 	for (int k = 0; k < 3; k++) {
 		v3_sub(centre, corner(s->m, t, k), x);
+		/* 1 % of the way to the centre, a guess: past the surface's border. */
 		v3_mad(corner(s->m, t, k), 1e-2, x, x);
 		if (holder(s, t, surface, x) == t)
 			return t;

@@ -3,9 +3,21 @@
 #include <math.h>
 #include <string.h>
 
-#define FLAT 1e-3 /* of the least distance: height of the flattest piece that flips make */
+/* Height of the flattest piece that flips make, a fraction of the least distance of points
+ * (`apart`): flips stay clear of what rounding turns over. A guess. */
+#define FLAT 1e-3
 
-enum { PASSES_MAX = 64, PIECES_MAX = 1 << 28 };
+/* Sum of cotangents that an edge must exceed to be flipped: more than their rounding, lest flips
+ * go back and forth. A guess. */
+static const double flip_slack = 1e-6;
+
+enum {
+	/* Passes of flips over the pieces of a triangle, at most: they end by themselves, but for
+	 * rounding. A guess, far above what is needed. */
+	PASSES_MAX = 64,
+	/* Half-edges, three a piece, are numbered by 32 bits: room for five times as many. */
+	PIECES_MAX = 1 << 28
+};
 
 void mesh_set_triangle(struct triangulation *c, uint32_t triangle)
 {
@@ -202,7 +214,8 @@ void mesh_flip_edges(struct triangulation *c)
 		for (uint32_t i = c->triangle; i != RIM; i = piece_of(c, 3 * i)->next)
 			for (uint32_t h = 3 * i; h < 3 * i + 3; h++)
 				if (mesh_may_flip(c, h) &&
-				    cotangent(c, h) + cotangent(c, get_half(c, h).across) < -1e-6) {
+				    cotangent(c, h) + cotangent(c, get_half(c, h).across) <
+				    -flip_slack) {
 					mesh_flip_edge(c, h);
 					changed = 1;
 				}
