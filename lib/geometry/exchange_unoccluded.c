@@ -83,7 +83,8 @@ double geo_unoccluded_exchange(struct unoccluded *x, const struct facet *a,
 	/* A small facet close to a large one. */
 	const struct facet *small = a->radius < b->radius ? a : b, *large = small == a ? b : a;
 	int l = level(x, small, distance(small->centre, large));
-	/* The finest level's 36 points with Lambert's formula cost as much as the contour (a guess). */
+	/* With the finest level's 36 points Lambert's formula costs as much as the contour: a
+	 * guess. */
 	if (l < CUBATURE_LEVELS - 1)
 		return lambert(small, points(x, 0, small, NULL, l, &ra), large);
 	return geo_contour_exchange(a, b);

@@ -1,5 +1,5 @@
-/* Convex polygons as an eye sees them, which is any point: corners are relative to it, by coordinate, as vector
- * code likes them. */
+/* Convex polygons as an eye, which is any point, sees them: corners are relative to it, by
+ * coordinate, as vector code likes them. */
 #ifndef TWOPASS_POINT_POLYGON_H
 #define TWOPASS_POINT_POLYGON_H
 

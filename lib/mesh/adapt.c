@@ -127,7 +127,8 @@ static void find_room(struct plan *p, double smallest)
 {
 	for (size_t i = 0; i < p->m->element.n; i++) {
 		double edge = longest(p->m, i);
-		while (p->most[i] < HALVINGS_MAX && edge >= smallest * sqrt(2) * (1 - length_slack)) {
+		while (p->most[i] < HALVINGS_MAX &&
+		       edge >= smallest * sqrt(2) * (1 - length_slack)) {
 			edge /= sqrt(2);
 			p->most[i]++;
 		}
@@ -260,8 +261,8 @@ static void count_marked(const struct plan *p, double bound, struct mesh_report 
 }
 
 int mesh_adapt_plan(const struct model *m, const struct solution *s,
-                    const struct mesh_refinement *o, double smallest, uint8_t *halving, uint8_t *patch_halving,
-                    struct mesh_report *r, struct err *e)
+                    const struct mesh_refinement *o, double smallest, uint8_t *halving,
+                    uint8_t *patch_halving, struct mesh_report *r, struct err *e)
 {
 	struct plan p = { .m = m, .elements = o->elements, .halvings = halving,
 		          .patch_halvings = patch_halving };

@@ -45,7 +45,8 @@ struct patch_frame *mesh_patch_frames(const struct model *m, struct err *e)
 		uint32_t p = m->element.patch[i];
 		double part = m->element.area[i] / (3 * m->patch.area[p]);
 		for (size_t k = 0; k < 3; k++)
-			v3_mad(frame[p].centre, part, &m->vertex[3 * (size_t)m->element.corner[3 * i + k]],
+			v3_mad(frame[p].centre, part,
+			       &m->vertex[3 * (size_t)m->element.corner[3 * i + k]],
 			       frame[p].centre);
 		v3_mad(frame[p].normal, m->element.area[i], &m->element.normal[3 * (size_t)i],
 		       frame[p].normal);
@@ -69,7 +70,8 @@ static int prepare(struct search *s)
 			lo[k] = INFINITY, hi[k] = -INFINITY;
 			s->triangle[3 * (size_t)p + k] = 2 * p + (k > 0);
 		}
-		for (size_t i = 3 * (size_t)m->patch.start[p]; i < 3 * (size_t)m->patch.start[p + 1]; i++)
+		for (size_t i = 3 * (size_t)m->patch.start[p];
+		     i < 3 * (size_t)m->patch.start[p + 1]; i++)
 			for (size_t k = 0; k < 3; k++) {
 				double x = m->vertex[3 * (size_t)m->element.corner[i] + k];
 				lo[k] = fmin(lo[k], x);

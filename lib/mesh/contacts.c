@@ -141,7 +141,8 @@ static int emits(const struct model *m, uint32_t triangle)
 {
 	uint32_t material = m->surface.material[m->triangle.surface[triangle]];
 
-	return bsdf_emits(&m->material, material, FRONT) || bsdf_emits(&m->material, material, BACK);
+	return bsdf_emits(&m->material, material, FRONT) ||
+	       bsdf_emits(&m->material, material, BACK);
 }
 
 /* Notes that triangle b meets the plane of triangle a between p and q. The light that a lamp

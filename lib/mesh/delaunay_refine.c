@@ -16,8 +16,8 @@ enum {
 	 * end by themselves, but for rounding. Guesses, far above what is needed. */
 	ROUNDS_MAX = 64,
 	STEPS_MAX = 10000,
-	/* Pieces shorter than the triangle's longest edge over this are left alone: where lines meet
-	 * at small angles the refinement goes on to the least size all around. A guess. */
+	/* Pieces shorter than the triangle's longest edge over this are left alone: where lines
+	 * meet at small angles the refinement goes on to the least size all around. A guess. */
 	FINEST = 32
 };
 

@@ -105,15 +105,15 @@ static void mark_large(struct finder *f, double width, double *sum)
 		double *s = &sum[5 * (size_t)geo_sets_find(f->plane, t)];
 		double weight = v3_length(&f->area[3 * (size_t)t]) / 3;
 		for (size_t k = 0; k < 3; k++)
-			v3_mad(s, weight, &m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)t + k]],
-			       s);
+			v3_mad(s, weight,
+			       &m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)t + k]], s);
 		s[3] += 3 * weight;
 	}
 	for (uint32_t t = 0; t < m->triangle.n; t++) {
 		double *s = &sum[5 * (size_t)geo_sets_find(f->plane, t)], d[3];
 		for (size_t k = 0; k < 3; k++) {
-			v3_mad(&m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)t + k]], -1 / s[3],
-			       s, d);
+			v3_mad(&m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)t + k]],
+			       -1 / s[3], s, d);
 			s[4] = fmax(s[4], v3_length(d));
 		}
 	}
@@ -169,7 +169,8 @@ static void find_guides(const struct finder *f, const uint32_t *region, struct g
 			struct guide *best = &guide[region[h / 3]], new = { .half = h };
 			double d[3];
 			v3_sub(&m->vertex[3 * (size_t)geo_half_edge_to(m->triangle.corner, h)],
-			       &m->vertex[3 * (size_t)geo_half_edge_from(m->triangle.corner, h)], d);
+			       &m->vertex[3 * (size_t)geo_half_edge_from(m->triangle.corner, h)],
+			       d);
 			new.length = coarse(v3_dot(d, d));
 			new.boundary = (uint8_t)on_boundary(f, region, i, u);
 			if (new.boundary > best->boundary ||
