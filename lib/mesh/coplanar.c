@@ -92,7 +92,8 @@ static uint32_t holder(const struct search *s, uint32_t t, uint32_t surface, con
 	return t;
 }
 
-/* Is t so thin that its neighbours seem to cover it? */
+/* Is t so thin that its neighbours seem to cover it? Its height is less than four times what points
+ * of a cut may be apart and still be one: a guess. */
 static int thin(const struct search *s, uint32_t t)
 {
 	double n[3];
