@@ -5,7 +5,8 @@
 
 #include "lib/geometry/morton.h"
 
-/* A count of triangles; a guess: as many as one look at a box costs. */
+/* Triangles in a leaf, at most: fewer make more nodes, more make more tests a visit. A guess;
+ * neither what is found nor its order depends on it. */
 enum { LEAF = 4 };
 
 struct place {
@@ -14,7 +15,7 @@ struct place {
 };
 
 /* The box of a triangle's corners (rows of vertex). */
-static struct box geo_triangle_box(const double *vertex, const uint32_t *corner)
+static struct box triangle_box(const double *vertex, const uint32_t *corner)
 {
 	struct box b;
 
@@ -111,7 +112,7 @@ int geo_boxes_build(struct boxes *b, const double *vertex, const uint32_t *trian
 	if (!b->order || !b->box || !b->node)
 		return -1;
 	for (size_t t = 0; t < n; t++)
-		b->box[t] = geo_triangle_box(vertex, &triangle[3 * t]);
+		b->box[t] = triangle_box(vertex, &triangle[3 * t]);
 	if (sort_triangles(b, e))
 		return -1;
 	if (n)

@@ -4,8 +4,21 @@
 #include "lib/base/vec.h"
 #include "lib/geometry/point_polygon.h"
 
-/* A count: beyond it the halves are below rounding of the edge, 2^-53. */
-enum { DEEPEST = 48 };        /* bisections of an edge, towards a corner it nearly meets */
+/* Bisections of an edge, at most: towards a corner that it nearly meets, each halves the rest,
+ * and after some 50 that is the rounding of the edge's length. */
+enum { DEEPEST = 48 };
+
+/* Cosine of two edges below which they are perpendicular: what they contribute, which is in
+ * proportion to it, is rounding. */
+static const double perpendicular = 1e-16;
+
+/* Squared sine of two edges below which they are parallel: 1e-12 is well above the rounding of
+ * their directions and moves an end by as little. The value is a guess. */
+static const double parallel_sine2 = 1e-24;
+
+/* Error that the adaptive quadrature of two edges may have, over the product of their
+ * lengths: a few roundings; tests/unit/test_polygon.c compares with exact values. */
+static const double quadrature_error = 1e-15;
 
 double geo_contour_point(const double x[3], const double normal[3], int n, const double *v)
 {
@@ -109,7 +122,7 @@ static double adaptive(const struct edge *e, const struct edge *f, double s0, do
 			k += kronrod_w[i] * y;
 			g += i & 1 ? gauss_w[i / 2] * y : 0;
 		}
-	/* The Kronrod value is as good as the difference's power 1.5 (QUADPACK). */
+	/* The Kronrod value is as good as (200 x the difference)^1.5: both are QUADPACK's. */
 	double scale = f->length * half, off = fabs(k - g) * half / scale;
 	if (depth == 0 || scale * fmin(off, pow(200 * off, 1.5)) <= tolerance)
 		return k * half;
@@ -121,10 +134,10 @@ static double edge_pair(const struct edge *e, const struct edge *f)
 {
 	double c = v3_dot(e->t, f->t), s[3];
 
-	if (fabs(c) < 1e-16)
+	if (fabs(c) < perpendicular)
 		return 0;
 	v3_cross(e->t, f->t, s);
-	if (v3_dot(s, s) < 1e-24)
+	if (v3_dot(s, s) < parallel_sine2)
 		return c * parallel(e, f, c > 0 ? 1 : -1);
 	if (same_point(e->a, f->a))
 		return c * cornered(e, e->b, f, f->b);
@@ -135,7 +148,8 @@ static double edge_pair(const struct edge *e, const struct edge *f)
 	if (same_point(e->b, f->a))
 		return c * cornered(e, e->a, f, f->b);
 	const struct edge *outer = e->length < f->length ? e : f, *inner = outer == e ? f : e;
-	return c * adaptive(outer, inner, 0, outer->length, 1e-15 * e->length * f->length, DEEPEST);
+	return c * adaptive(outer, inner, 0, outer->length,
+	                    quadrature_error * e->length * f->length, DEEPEST);
 }
 
 static void make_edge(const struct facet *p, int i, const double origin[3], double unit,

@@ -3,7 +3,8 @@
 #include "lib/base/constants.h"
 #include "lib/base/vec.h"
 
-/* Points of each level's rule of a quadrilateral: 2 x 2, 8, 4 x 4, 6 x 6. */
+/* Points of a triangle or quadrilateral, multiples of four: 3 or 2 x 2, 7, 4 x 4, 6 x 6, filled
+ * up with points of weight 0. Which rules there are is a guess at what errors ask for. */
 static const int level_points[CUBATURE_LEVELS] = { 4, 8, 16, 36 };
 
 /* Gauss-Legendre abscissae and weights on [-1, 1], the positive half. */
@@ -168,7 +169,8 @@ static four seen_from(const struct cubature *from, int i, const struct cubature 
 	/* x / p + y / q by one division. */
 	for (; j + 4 < c->n; j += 8) {
 		four a = fourth_power(c, j, p), b = fourth_power(c, j + 4, p);
-		sum += (*(const four *)(height + j) * b + *(const four *)(height + j + 4) * a) / (a * b);
+		sum += (*(const four *)(height + j) * b + *(const four *)(height + j + 4) * a) /
+		       (a * b);
 	}
 	if (j < c->n)
 		sum += *(const four *)(height + j) / fourth_power(c, j, p);
@@ -198,8 +200,9 @@ double geo_cubature_exchange(const struct facet *a, const struct cubature *ca,
 	return (sum[0] + sum[1] + sum[2] + sum[3]) / PI;
 }
 
-/* Relative errors measured on triangles and rectangles seen by far smaller ones are below
- * factor (r / gap)^power; level 0 is for quadrilaterals only. */
+/* Relative errors are below factor (r / gap)^power, where the power is the rule's order and the
+ * factor was fitted to errors of triangles and rectangles seen by far smaller ones (test_polygon
+ * checks the bounds: test_cubature_reach); level 0 is for quadrilaterals only. */
 static const struct {
 	double factor, power;
 } level_error[CUBATURE_LEVELS] = { { 16, 4 }, { 8, 6 }, { 2, 8 }, { .04, 12 } };

@@ -56,7 +56,8 @@ void geo_pair_fill(const struct facet *f, struct cubature_pair *j)
  * the fifth or fourth where one or both do. Over 100 000 pairs of squares, rectangles and
  * parallelograms of radii in ratios to 100, most of them touching the other's plane, it
  * stayed below .85 of .75 r^6 + .15 r^5 d (ra / hb + rb / ha) + .025 r^4 d^2 ra rb / (ha hb),
- * by d^6; r d is below 6 r^2 + d^2 / 24. What is skew errs by its second moments. */
+ * by d^6; r d is below 6 r^2 + d^2 / 24. What is skew errs by its second moments. No
+ * command repeats the fit; test_polygon checks the bound for some pairs (test_joint). */
 int geo_pair_reaches(const struct facet *a, const struct cubature_pair *ja, const struct facet *b,
                      const struct cubature_pair *jb, double tolerance)
 {
@@ -87,8 +88,8 @@ static four r4(const double (*x)[4], double px, double py, double pz)
 	return r2 * r2;
 }
 
-double geo_pair_exchange(const struct facet *a, const struct cubature_pair *ja, const struct facet *b,
-                         const struct cubature_pair *jb)
+double geo_pair_exchange(const struct facet *a, const struct cubature_pair *ja,
+                         const struct facet *b, const struct cubature_pair *jb)
 {
 	const double *ca = ja->centroid, *cb = jb->centroid;
 	four of_b = heights(a, jb->corner), of_a = heights(b, ja->corner), p[4];
@@ -111,8 +112,8 @@ double geo_pair_exchange(const struct facet *a, const struct cubature_pair *ja, 
 enum { NORMAL = 0, OFFSET = 3, CENTRE = 4, RADIUS = 7, AREA = 8, SKEW = 9, CENTROID = 10,
        CORNER = 13, EDGE = 25, ROWS = 37 };
 
-int geo_pair_table_new(const struct facet *f, const struct cubature_pair *j, size_t n, double tolerance,
-                       double near, struct cubature_pair_table *t, struct err *e)
+int geo_pair_table_new(const struct facet *f, const struct cubature_pair *j, size_t n,
+                       double tolerance, double near, struct cubature_pair_table *t, struct err *e)
 {
 	*t = (struct cubature_pair_table){ .n = n, .tolerance = tolerance, .near = near };
 	if (n > SIZE_MAX - 3 || !(t->row = mem_new(n + 3, ROWS * sizeof *t->row, "facets", e)))
@@ -187,7 +188,8 @@ static inline four sum_from(const struct quad *q, size_t points, const four h[4]
 
 	for (size_t i = 0; i < 4; i++)
 		p[i] = r4_to(q, points, i, x, y, z);
-	return (h[0] * p[1] + h[1] * p[0]) / (p[0] * p[1]) + (h[2] * p[3] + h[3] * p[2]) / (p[2] * p[3]);
+	return (h[0] * p[1] + h[1] * p[0]) / (p[0] * p[1]) +
+	       (h[2] * p[3] + h[3] * p[2]) / (p[2] * p[3]);
 }
 
 /* geo_pair_reaches, for facets wholly in front of one another. */
@@ -202,11 +204,13 @@ static four_mask quad_reaches(const struct quad *a, const struct quad *b, four h
 	four left = tolerance * r2 - (number(a, SKEW) + number(b, SKEW)) * s;
 	four vary = (.9 * s + .15 / 24 * r2) * (rb * hb + ra * ha);
 	return (hb >= ra) & (ha >= rb) &
-	       (s * s * (.75 * s * ha * hb + vary + .025 * r2 * ra * rb) <= left * ha * hb * r2 * r2);
+	       (s * s * (.75 * s * ha * hb + vary + .025 * r2 * ra * rb) <=
+	        left * ha * hb * r2 * r2);
 }
 
 /* Are all corners of one facet behind the other's plane, or as good as in it? */
-static four_mask quad_behind(const struct quad *a, const struct quad *b, four ha, four hb, double near)
+static four_mask quad_behind(const struct quad *a, const struct quad *b, four ha, four hb,
+                             double near)
 {
 	four sine2 = { 0 };
 
@@ -237,9 +241,12 @@ static four quad_exchange(const struct quad *a, const struct quad *b)
 		corners += height_of(b, a, CORNER, i) *
 		           sum_from(b, CORNER, of_b, coordinate(a, CORNER, 0, i),
 		                    coordinate(a, CORNER, 1, i), coordinate(a, CORNER, 2, i));
-	four edges = height(b, ca[0], ca[1], ca[2]) * sum_from(b, EDGE, edge_b, ca[0], ca[1], ca[2]) +
-	             height(a, cb[0], cb[1], cb[2]) * sum_from(a, EDGE, edge_a, cb[0], cb[1], cb[2]);
-	return number(a, AREA) * number(b, AREA) * (corner_weight * corners + edge_weight * edges) * (1 / PI);
+	four edges = height(b, ca[0], ca[1], ca[2]) *
+	             sum_from(b, EDGE, edge_b, ca[0], ca[1], ca[2]) +
+	             height(a, cb[0], cb[1], cb[2]) *
+	             sum_from(a, EDGE, edge_a, cb[0], cb[1], cb[2]);
+	return number(a, AREA) * number(b, AREA) *
+	       (corner_weight * corners + edge_weight * edges) * (1 / PI);
 }
 
 void geo_pair_one(const struct cubature_pair_table *t, size_t i, double one[PAIR_ONE])
@@ -251,8 +258,8 @@ void geo_pair_one(const struct cubature_pair_table *t, size_t i, double one[PAIR
 			one[4 * row + k] = t->row[row * (t->n + 3) + i];
 }
 
-int geo_pair_four(const struct cubature_pair_table *t, const double one[PAIR_ONE], size_t j, int swap,
-                  double x[4])
+int geo_pair_four(const struct cubature_pair_table *t, const double one[PAIR_ONE], size_t j,
+                  int swap, double x[4])
 {
 	const struct quad same = { one, 4 }, other = { t->row + j, t->n + 3 };
 	const struct quad *a = swap ? &other : &same, *b = swap ? &same : &other;

@@ -63,14 +63,15 @@ static double lambert(const struct facet *a, const struct cubature *c, const str
 	return sum;
 }
 
-double geo_unoccluded_exchange(struct unoccluded *x, const struct facet *a, struct unoccluded_points pa,
-                               const struct facet *b, struct unoccluded_points pb)
+double geo_unoccluded_exchange(struct unoccluded *x, const struct facet *a,
+                               struct unoccluded_points pa, const struct facet *b,
+                               struct unoccluded_points pb)
 {
 	struct cubature ra, rb;
 	double d[3];
 
-	if (pa.joint && pb.joint && geo_pair_reaches(a, pa.joint, b, pb.joint, x->relative))
-		return geo_pair_exchange(a, pa.joint, b, pb.joint);
+	if (pa.pair && pb.pair && geo_pair_reaches(a, pa.pair, b, pb.pair, x->relative))
+		return geo_pair_exchange(a, pa.pair, b, pb.pair);
 	v3_sub(b->centre, a->centre, d);
 	double apart = v3_length(d);
 	int la = level(x, a, apart - b->radius), lb = level(x, b, apart - a->radius);
@@ -82,6 +83,8 @@ double geo_unoccluded_exchange(struct unoccluded *x, const struct facet *a, stru
 	/* A small facet close to a large one. */
 	const struct facet *small = a->radius < b->radius ? a : b, *large = small == a ? b : a;
 	int l = level(x, small, distance(small->centre, large));
+	/* With the finest level's 36 points Lambert's formula costs as much as the contour: a
+	 * guess. */
 	if (l < CUBATURE_LEVELS - 1)
 		return lambert(small, points(x, 0, small, NULL, l, &ra), large);
 	return geo_contour_exchange(a, b);

@@ -8,15 +8,16 @@
 #include "lib/geometry/cubature.h"
 #include "lib/geometry/cubature_pair.h"
 
-/* Points of a facet that are kept: [CUBATURE_LEVELS], and its joint ones; or NULL. */
+/* Points of a facet that are kept: [CUBATURE_LEVELS], and those of the rule for pairs; or NULL. */
 struct unoccluded_points {
 	const struct cubature *level;
-	const struct cubature_pair *joint;
+	const struct cubature_pair *pair;
 };
 
 /* One thread's scratch space and what accuracy asks for. */
 struct unoccluded {
 	double relative, reach[CUBATURE_LEVELS];
+	/* Enough for the finest level: 36 points for every two corners but the first two. */
 	double points[2][4][FACET_CORNERS * 18];
 };
 
@@ -24,7 +25,8 @@ struct unoccluded {
 void geo_unoccluded_init(struct unoccluded *c, double relative);
 
 /* Exchange area, m^2, of facets that lie in front of one another. */
-double geo_unoccluded_exchange(struct unoccluded *c, const struct facet *a, struct unoccluded_points pa,
-                               const struct facet *b, struct unoccluded_points pb);
+double geo_unoccluded_exchange(struct unoccluded *c, const struct facet *a,
+                               struct unoccluded_points pa, const struct facet *b,
+                               struct unoccluded_points pb);
 
 #endif

@@ -101,7 +101,7 @@ int geo_facet_split(const struct facet *f, const double normal[3], double offset
 }
 
 /* Unit vector along the longest edge. */
-static void mesh_longest_edge(const struct facet *f, double along[3])
+static void longest_edge(const struct facet *f, double along[3])
 {
 	double longest = 0, u[3];
 
@@ -119,7 +119,7 @@ int geo_facet_halve(const struct facet *f, struct facet_room half[2])
 {
 	double along[3] = { 0 };
 
-	mesh_longest_edge(f, along);
+	longest_edge(f, along);
 	return geo_facet_split(f, along, v3_dot(along, f->centre), half);
 }
 
@@ -128,7 +128,7 @@ int geo_facet_quarter(const struct facet *f, struct facet_room quarter[4])
 	struct facet_room half[2];
 	double along[3] = { 0 }, across[3];
 
-	mesh_longest_edge(f, along);
+	longest_edge(f, along);
 	v3_cross(f->normal, along, across);
 	double middle = v3_dot(across, f->centre);
 	return geo_facet_split(f, along, v3_dot(along, f->centre), half) &&
@@ -150,5 +150,6 @@ void geo_facet_point(const struct facet *f, double u, double v, double x[3])
 		u -= area[i];
 	double r = sqrt(fmin(1, u / area[i]));
 	for (int k = 0; k < 3; k++)
-		x[k] = (1 - r) * f->v[k] + r * ((1 - v) * f->v[3 * i + k] + v * f->v[3 * i + 3 + k]);
+		x[k] = (1 - r) * f->v[k] +
+		       r * ((1 - v) * f->v[3 * i + k] + v * f->v[3 * i + 3 + k]);
 }

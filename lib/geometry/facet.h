@@ -1,4 +1,4 @@
-/* Facets: convex planar polygons that send light from, and receive it on, their front.
+/* Facets: convex planar polygons that shoot light from, and receive it on, their front.
  * A planar patch-side is one facet, or several where its outline is not convex or has many
  * corners. */
 #ifndef TWOPASS_FACET_H
@@ -6,7 +6,8 @@
 
 #include <stddef.h>
 
-/* The most corners that a facet may have, a count; a guess. Larger polygons are cut into several. */
+/* The most corners that a facet may have; polygons with more are cut into several. 16 is a guess:
+ * quadrilaterals, cut by a dozen planes, fit, and scratch arrays stay small. */
 enum { FACET_CORNERS = 16 };
 
 struct facet {

@@ -24,7 +24,7 @@ static inline struct morton_curve geo_morton_curve(const double lo[3], const dou
 	return c;
 }
 
-/* 21 bits of x moved to every third place. */
+/* 21 bits of x moved to every third place: three times 21 fill a code of 64 bits. */
 static inline uint64_t spread_bits(uint64_t x)
 {
 	x = (x | x << 32) & 0x1f00000000ffffu;

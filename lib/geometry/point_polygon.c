@@ -50,7 +50,8 @@ void geo_point_polygon_cut(const struct point_polygon *p, const double normal[3]
 	double h[POINT_POLYGON_CORNERS + 4], at[3];
 
 	for (int i = 0; i < p->n; i += 4)
-		four_store(h + i, normal[0] * four_load(p->x + i) + normal[1] * four_load(p->y + i) +
+		four_store(h + i, normal[0] * four_load(p->x + i) +
+		                  normal[1] * four_load(p->y + i) +
 		                  normal[2] * four_load(p->z + i));
 	in->n = away->n = 0;
 	for (int i = 0; i < p->n; i++) {
@@ -88,12 +89,14 @@ static four angle(four y, four x)
 	four_mask steep = y > far;
 	four low = four_choose(steep, far, y), high = four_choose(steep, y, far);
 	four_mask turned = low > eighth * high;     /* by 45 degrees */
-	four up = four_choose(turned, low - high, low), across = four_choose(turned, low + high, high);
+	four up = four_choose(turned, low - high, low);
+	four across = four_choose(turned, low + high, high);
 	four q = up / four_choose(across > 0, across, four_all(1)), t = q * q;
 	/* In pairs and fours, which wait less for one another. */
 	four t2 = t * t, t4 = t2 * t2, third[3];
 	for (int i = 0; i < 3; i++)
-		third[i] = arc[4 * i] + arc[4 * i + 1] * t + t2 * (arc[4 * i + 2] + arc[4 * i + 3] * t);
+		third[i] = arc[4 * i] + arc[4 * i + 1] * t +
+		           t2 * (arc[4 * i + 2] + arc[4 * i + 3] * t);
 	four sum = (third[0] + t4 * (third[1] + t4 * third[2])) * q +
 	           four_choose(turned, four_all(PI / 4), four_all(0));
 	sum = four_choose(steep, PI / 2 - sum, sum);
@@ -111,7 +114,8 @@ double geo_point_polygon_factor(const struct point_polygon *p, const double norm
 		four cx = ay * bz - az * by, cy = az * bx - ax * bz, cz = ax * by - ay * bx;
 		four s = four_sqrt(cx * cx + cy * cy + cz * cz);
 		four up = normal[0] * cx + normal[1] * cy + normal[2] * cz;
-		four term = up / four_choose(s > 0, s, four_all(1)) * angle(s, ax * bx + ay * by + az * bz);
+		four term = up / four_choose(s > 0, s, four_all(1)) *
+		            angle(s, ax * bx + ay * by + az * bz);
 		sum += four_choose(s > 0, term, four_all(0));
 	}
 	return -four_sum(sum) / (2 * PI);

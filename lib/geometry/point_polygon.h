@@ -1,19 +1,20 @@
-/* Convex polygons as an eye sees them: corners are relative to it, by coordinate, as vector
- * code likes them. */
+/* Convex polygons as an eye, which is any point, sees them: corners are relative to it, by
+ * coordinate, as vector code likes them. */
 #ifndef TWOPASS_POINT_POLYGON_H
 #define TWOPASS_POINT_POLYGON_H
 
 #include "lib/base/vec.h"
 
-/* A count. Each plane that cuts a convex polygon gives it a corner more, at most: room for a facet
- * of 16 corners and 64 cuts, as many as an occluder's outline has edges. */
+/* The most corners: a facet's 16, and as each plane that cuts a convex polygon gives it one more
+ * at most, 64 cuts. A guess; whoever cuts stops when there is no room. */
 enum { POINT_POLYGON_CORNERS = 80 };
 
 struct point_polygon {
 	int n;
 	/* The first corner stands again behind the last, to the end of that vector and one
 	 * beyond. */
-	double x[POINT_POLYGON_CORNERS + 8], y[POINT_POLYGON_CORNERS + 8], z[POINT_POLYGON_CORNERS + 8];
+	double x[POINT_POLYGON_CORNERS + 8], y[POINT_POLYGON_CORNERS + 8];
+	double z[POINT_POLYGON_CORNERS + 8];
 };
 
 /* n (at most POINT_POLYGON_CORNERS) corners v [n][3] as seen from x. */

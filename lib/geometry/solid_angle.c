@@ -19,7 +19,8 @@ double geo_solid_angle(const double *v, const double x[3])
 	towards(v, x, to);
 	v3_cross(to[1], to[2], normal);
 	return 2 * fabs(atan2(fabs(v3_dot(to[0], normal)),
-	                      1 + v3_dot(to[0], to[1]) + v3_dot(to[1], to[2]) + v3_dot(to[2], to[0])));
+	                      1 + v3_dot(to[0], to[1]) + v3_dot(to[1], to[2]) +
+	                      v3_dot(to[2], to[0])));
 }
 
 /* On the arc from a towards b, where the cosine to a is c. */

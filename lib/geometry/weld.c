@@ -9,8 +9,8 @@
 
 #define NOBODY UINT32_MAX
 
-/* Edge of a cell, in tolerances. A guess: few points are so near a wall of their cell that its
- * neighbours are looked at, and few cells hold two points. */
+/* Side of a cell, in tolerances: wider cells hold more points to compare, narrower ones make
+ * more points look into several. A guess; the result does not depend on it. */
 enum { CELL = 8 };
 
 /* The points that stand for their likes, chained by hash bucket. */

@@ -27,7 +27,7 @@ int geo_weld_points(const struct weld *w, uint32_t *id, size_t *count, struct er
 
 /* The distance below which points of a box are one: 1e-9 of its diagonal (far
  * below the spacing of float32, far above the rounding of a transform) and no
- * less than that rounding where the coordinates are large. */
+ * less than that rounding where the coordinates are large. The 1e-9 is a guess in between. */
 double geo_weld_tolerance(const double lo[3], const double hi[3]);
 
 #endif

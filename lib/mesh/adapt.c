@@ -13,25 +13,32 @@
 /* What is left of an element's energy when it has been halved once: 1/4 in a smooth field,
  * whose error is that of linear interpolation, and 1/sqrt(2) where a shadow's edge runs
  * through it, whose length stays. Edges decide. */
-static const double left = .70710678118654752;
+static const double left = .70710678118654752;   /* a ratio; derived, not measured */
 
 /* What one step leaves of the energy, if more is asked for: the last of it would take elements
- * wherever there is any error at all.
- * A fraction; a guess. */
+ * wherever there is any error at all. A ratio of energies; a guess. */
 static const double once = .4;
 
 /* Of the variance, what an estimate that has it subtracted may still be off by: that looks at
- * some ten second differences, which are larger than noise, and noise is far from even.
- * One over a fraction; a guess, on the safe side of ten. */
+ * some ten second differences, which are larger than noise, and noise is far from even. A ratio
+ * of variances: ten standard errors; a guess. */
 static const double doubtful = 100;
 
 /* Counts. BISECTIONS of a range of 1e12 find a bound to a double's 1e-12; the others are guesses. */
 enum {
-	ELEMENTS_A_PATCH = 5, /* at least, when it is halved */
-	HALVINGS_MAX = 4, /* in one step: to a quarter of the edge, as far as an estimate
-	                     made of whole elements can be trusted */
+	/* Elements that each part of a halved patch has, at least: one more than patches.c asks
+	 * for (ELEMENTS_MIN), as cuts do not part them evenly. A guess. */
+	ELEMENTS_A_PATCH = 5,
+	/* Halvings in one step, at most: to a quarter of the edge, as far as an estimate made of
+	 * whole elements can be trusted. A guess. */
+	HALVINGS_MAX = 4,
+	/* Steps of the search for the bound, whose range is 2^-40 of the largest energy to that:
+	 * its logarithm is halved as often, to the last bit that matters. A guess. */
 	BISECTIONS = 40
 };
+
+/* Rounding of a length, a ratio: edges that are meant to be as long as the least size are. */
+static const double length_slack = 1e-9;
 
 struct plan {
 	const struct model *m;
@@ -51,7 +58,8 @@ static double certain(const struct solution *s, size_t at)
 {
 	double direct = s->error.discretisation_direct[at] * s->error.discretisation_direct[at];
 	double other = s->error.discretisation[at] * s->error.discretisation[at] - direct;
-	double noise = s->error.sampling[at] * s->error.sampling[at] - s->error.sampling_direct[at] * s->error.sampling_direct[at];
+	double noise = s->error.sampling[at] * s->error.sampling[at] -
+	               s->error.sampling_direct[at] * s->error.sampling_direct[at];
 
 	return direct + fmax(0, other - doubtful * fmax(0, noise));
 }
@@ -120,7 +128,8 @@ static void find_room(struct plan *p, double smallest)
 {
 	for (size_t i = 0; i < p->m->element.n; i++) {
 		double edge = longest(p->m, i);
-		while (p->most[i] < HALVINGS_MAX && edge >= smallest * sqrt(2) * (1 - 1e-9)) {
+		while (p->most[i] < HALVINGS_MAX &&
+		       edge >= smallest * sqrt(2) * (1 - length_slack)) {
 			edge /= sqrt(2);
 			p->most[i]++;
 		}
@@ -143,7 +152,9 @@ static uint8_t halvings_with(const struct plan *p, uint32_t patch)
 	double elements = p->m->patch.start[patch + 1] - p->m->patch.start[patch];
 	double wanted = p->patch_halvings[patch] + log2(ELEMENTS_A_PATCH / elements);
 
-	return p->patch_halvings[patch] && wanted > .5 ? (uint8_t)fmin(HALVINGS_MAX, wanted + .5) : 0;
+	if (!p->patch_halvings[patch] || !(wanted > .5))
+		return 0;
+	return (uint8_t)fmin(HALVINGS_MAX, wanted + .5);
 }
 
 /* What a bound leads to: halvings, elements, and the sum of energies that is left. A patch
@@ -250,9 +261,9 @@ static void count_marked(const struct plan *p, double bound, struct mesh_report 
 	}
 }
 
-int mesh_adapt_plan(const struct model *m, const struct solution *s, const struct mesh_refinement *o,
-                    double smallest, uint8_t *halving, uint8_t *patch_halving,
-                    struct mesh_report *r, struct err *e)
+int mesh_adapt_plan(const struct model *m, const struct solution *s,
+                    const struct mesh_refinement *o, double smallest, uint8_t *halving,
+                    uint8_t *patch_halving, struct mesh_report *r, struct err *e)
 {
 	struct plan p = { .m = m, .elements = o->elements, .halvings = halving,
 		          .patch_halvings = patch_halving };

@@ -13,12 +13,11 @@
 #include "lib/mesh/stages.h"
 
 /* Of the squared deviations in a patch, what arrives where all of its light is smeared by a
- * lobe: as in adapt_patches.c.
- * A fraction; a guess. */
+ * lobe, a ratio: as in adapt_patches.c, and a guess as there. */
 static const double arriving = .1;
 
-/* Of the mean over patch-sides, the least deviation that is worth a look at all lobes.
- * A fraction; a guess. */
+/* Of the mean over patch-sides, the least deviation that is worth a look at all lobes. A ratio;
+ * a guess: what is left out is .1 % of the sum at most. */
 static const double notable = 1e-3;
 
 /* A patch-side with a lobe for light that arrives there. */
@@ -101,7 +100,8 @@ int mesh_lobe_energies(const struct model *m, const struct solution *s,
 			status = add_shiny(m, ps, &list, e);
 	const struct shiny *shiny = list.data;
 	if (!status && list.n) {
-		double least = notable * find_deviations(m, s, deviation) / (2 * (double)m->patch.n);
+		double least = notable * find_deviations(m, s, deviation) /
+		               (2 * (double)m->patch.n);
 		for (uint32_t q = 0; q < 2 * m->patch.n; q++) {
 			double sum = 0;
 			if (!(deviation[q] > least))

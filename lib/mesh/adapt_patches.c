@@ -12,12 +12,20 @@
 
 /* Of the squared deviations in a patch, what arrives at a surface that meets it at a right
  * angle, as large as itself: the irradiance there is off by half of them at the common edge,
- * and by hardly anything a patch away.
- * A fraction; a guess between that half and hardly anything. */
+ * and by hardly anything a patch away. A ratio of energies; a guess. */
 static const double arriving = .1;
 
-/* Closer than so much of its size, a fraction; a guess. */
+/* How close a patch is that sees how light is distributed: a fraction of the root of the area. A
+ * guess; man/mesh.1 states it. */
 static const double reach = .25;
+
+/* Cosine of two patches' normals from which they count as parts of one plane or bent surface: 26
+ * degrees, wider than the default normal cone. A guess. */
+static const double one_surface = .9;
+
+/* Sine of the height of a patch's centre above the plane of another, from which it is in front:
+ * 6 degrees. A guess. */
+static const double in_front = .1;
 
 struct search {
 	const struct model *m;
@@ -37,7 +45,8 @@ struct patch_frame *mesh_patch_frames(const struct model *m, struct err *e)
 		uint32_t p = m->element.patch[i];
 		double part = m->element.area[i] / (3 * m->patch.area[p]);
 		for (size_t k = 0; k < 3; k++)
-			v3_mad(frame[p].centre, part, &m->vertex[3 * (size_t)m->element.corner[3 * i + k]],
+			v3_mad(frame[p].centre, part,
+			       &m->vertex[3 * (size_t)m->element.corner[3 * i + k]],
 			       frame[p].centre);
 		v3_mad(frame[p].normal, m->element.area[i], &m->element.normal[3 * (size_t)i],
 		       frame[p].normal);
@@ -61,7 +70,8 @@ static int prepare(struct search *s)
 			lo[k] = INFINITY, hi[k] = -INFINITY;
 			s->triangle[3 * (size_t)p + k] = 2 * p + (k > 0);
 		}
-		for (size_t i = 3 * (size_t)m->patch.start[p]; i < 3 * (size_t)m->patch.start[p + 1]; i++)
+		for (size_t i = 3 * (size_t)m->patch.start[p];
+		     i < 3 * (size_t)m->patch.start[p + 1]; i++)
 			for (size_t k = 0; k < 3; k++) {
 				double x = m->vertex[3 * (size_t)m->element.corner[i] + k];
 				lo[k] = fmin(lo[k], x);
@@ -77,15 +87,15 @@ static int is_close(struct search *s, uint32_t p, int side)
 	double sign = side == FRONT ? 1 : -1, d[3];
 
 	s->found.n = 0;
-	if (geo_boxes_find(&s->boxes, &s->boxes.box[p], reach * sqrt(s->m->patch.area[p]), &s->found,
-	                   s->e))
+	if (geo_boxes_find(&s->boxes, &s->boxes.box[p], reach * sqrt(s->m->patch.area[p]),
+	                   &s->found, s->e))
 		return -1;
 	const uint32_t *q = s->found.data;
 	for (size_t i = 0; i < s->found.n; i++) {
 		const struct patch_frame *here = &s->frame[p], *there = &s->frame[q[i]];
 		v3_sub(there->centre, here->centre, d);
-		if (fabs(v3_dot(here->normal, there->normal)) < .9 &&
-		    sign * v3_dot(here->normal, d) > .1 * v3_length(d))
+		if (fabs(v3_dot(here->normal, there->normal)) < one_surface &&
+		    sign * v3_dot(here->normal, d) > in_front * v3_length(d))
 			return 1;
 	}
 	return 0;
@@ -94,7 +104,8 @@ static int is_close(struct search *s, uint32_t p, int side)
 double mesh_patch_deviations(const struct model *m, const struct solution *s, uint32_t p, int side)
 {
 	const struct materials *mt = &m->material;
-	size_t here = model_material_at(mt, model_patch_material(m, p), side), bands = (size_t)m->bands;
+	size_t here = model_material_at(mt, model_patch_material(m, p), side);
+	size_t bands = (size_t)m->bands;
 	double all = 0;
 
 	for (size_t k = 0; k < bands; k++) {
@@ -119,10 +130,12 @@ int mesh_patch_energies(const struct model *m, const struct solution *s,
 	int status = prepare(&search);
 
 	for (uint32_t ps = 0; !status && ps < 2 * m->patch.n; ps++) {
-		int close = model_side_modelled(m, ps) ? is_close(&search, ps >> 1, (int)(ps & 1)) : 0;
+		uint32_t p = ps >> 1;
+		int side = (int)(ps & 1);
+		int close = model_side_modelled(m, ps) ? is_close(&search, p, side) : 0;
 		status = close < 0 ? -1 : 0;
 		if (close > 0)
-			energy[ps >> 1] += arriving * mesh_patch_deviations(m, s, ps >> 1, (int)(ps & 1));
+			energy[p] += arriving * mesh_patch_deviations(m, s, p, side);
 	}
 	free(search.corner);
 	free(search.triangle);

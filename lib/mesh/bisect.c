@@ -13,8 +13,12 @@
 
 #define NONE UINT32_MAX
 
-/* A count: element-sides then still fit 32 bits, and memory ends before. */
+/* Half-edges, three an element, are numbered by 32 bits, splits with a child by 31. */
 enum { ELEMENTS_MAX = 1 << 28 };
+
+/* By how much the square of an edge may exceed that of the size, a ratio: rounding, so that edges
+ * which are meant to be as long are not halved. */
+static const double size_slack = 1e-8;
 
 /* An element to be. Half-edge 3 leaf + k belongs to a doubly linked list of the
  * half-edges of edge[k]. */
@@ -242,7 +246,8 @@ static int begin(struct work *w, const uint32_t *corner, size_t leaves, const ui
 	}
 	for (size_t i = 0; !status && i < g.n; i++) {
 		uint32_t h = g.use[g.start[i]];
-		status = add_side(w, geo_half_edge_from(corner, h), geo_half_edge_to(corner, h), &side);
+		status = add_side(w, geo_half_edge_from(corner, h), geo_half_edge_to(corner, h),
+		                  &side);
 		for (uint32_t u = g.start[i]; !status && u < g.start[i + 1]; u++)
 			link_half(w, g.use[u], side);
 	}
@@ -286,7 +291,8 @@ static int next_side(struct work *w, uint32_t *side)
 {
 	while (w->heap.n) {
 		uint32_t first = *(uint32_t *)w->heap.data, longest = first;
-		for (uint32_t h = side_at(w, first)->head; h != NONE; h = leaf_of(w, h)->next[h % 3]) {
+		for (uint32_t h = side_at(w, first)->head; h != NONE;
+		     h = leaf_of(w, h)->next[h % 3]) {
 			uint32_t other = longest_side(w, h / 3);
 			if (before(w, other, longest))
 				longest = other;
@@ -375,7 +381,7 @@ int mesh_check_element_size(const struct model *m, double size, struct err *e)
 
 int mesh_bisect(struct model *m, double size, struct err *e)
 {
-	struct work w = { .m = m, .e = e, .limit = size * size * (1 + 1e-8) };
+	struct work w = { .m = m, .e = e, .limit = size * size * (1 + size_slack) };
 	int status = begin_triangles(&w) || halve_all(&w) || finish(&w, NULL) ? -1 : 0;
 
 	release(&w);

@@ -167,8 +167,9 @@ static int find_quads(struct search *s, struct err *e)
 		if (g.start[i + 1] - g.start[i] != 2 || !plane_quad(m, h[0], h[1]))
 			continue;
 		struct shape q = { .a = h[0] / 3, .b = h[1] / 3 };
-		uint32_t corner[4] = { geo_half_edge_from(m->triangle.corner, h[0]), geo_half_edge_to(m->triangle.corner, h[0]),
-			geo_half_edge_apex(m->triangle.corner, h[0]), geo_half_edge_apex(m->triangle.corner, h[1]) };
+		const uint32_t *of = m->triangle.corner;
+		uint32_t corner[4] = { geo_half_edge_from(of, h[0]), geo_half_edge_to(of, h[0]),
+			geo_half_edge_apex(of, h[0]), geo_half_edge_apex(of, h[1]) };
 		for (int k = 0; k < 4; k++)
 			q.position[k] = s->position[corner[k]];
 		sort_positions(q.position, 4);

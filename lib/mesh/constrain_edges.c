@@ -9,9 +9,12 @@
 
 #include "lib/mesh/triangulation.h"
 
-/* Steps of a walk over the pieces of one triangle, beyond which rounding leads it in circles: many
- * times the pieces that any triangle has had. A guess. */
+/* Steps along a line or about a vertex, at most: they end by themselves, but for rounding. A guess,
+ * far above what is needed. */
 enum { STEPS_MAX = 100000 };
+
+/* What rounding may leave between two points in line, a fraction of `apart`. A guess. */
+static const double nearer = 1e-3;
 
 /* ---- points ---- */
 
@@ -21,7 +24,8 @@ static double depth(const struct triangulation *c, uint32_t i, struct point x, u
 	double least = INFINITY;
 
 	for (uint32_t h = 3 * i; h < 3 * i + 3; h++) {
-		double d = left_of(flat_vertex(c, from(c, h)), flat_vertex(c, from(c, following(h))), x);
+		double d = left_of(flat_vertex(c, from(c, h)),
+		                   flat_vertex(c, from(c, following(h))), x);
 		if (d < least) {
 			least = d;
 			*side = h;
@@ -124,7 +128,7 @@ static void look(const struct triangulation *c, uint32_t h, uint32_t u, uint32_t
 		/* Nearer to the end by more than rounding, lest two vertices on either side
 		 * of the line lead to each other. */
 		int on = vertex == v || (fabs(left[k]) <= c->apart && along > 0 &&
-		                         distance(x, end) < length - 1e-3 * c->apart);
+		                         distance(x, end) < length - nearer * c->apart);
 		if (on && (w->edge == RIM || along < w->along)) {
 			w->edge = edge[k];
 			w->vertex = vertex;
@@ -337,7 +341,8 @@ static int too_thin(const struct model *m, uint32_t triangle, double height)
 	return 2 * v3_length(area) <= height * mesh_longest_edge(m, triangle);
 }
 
-int mesh_constrain_edges(const struct model *m, const struct half_edges *g, const struct contacts *contacts,
+int mesh_constrain_edges(const struct model *m, const struct half_edges *g,
+                         const struct contacts *contacts,
                          const struct imprint_limits *limits, struct pieces *p, struct err *e)
 {
 	struct triangulation c = { .m = m, .g = g, .p = p, .apart = limits->apart, .e = e };

@@ -55,9 +55,14 @@ static int neighbours(const struct model *m, uint32_t a, uint32_t b)
 	if (m->triangle.surface[a] != m->triangle.surface[b])
 		return 0;
 	for (size_t i = 0; i < 9; i++)
-		shared += m->triangle.corner[3 * (size_t)a + i / 3] == m->triangle.corner[3 * (size_t)b + i % 3];
+		shared += m->triangle.corner[3 * (size_t)a + i / 3] ==
+		          m->triangle.corner[3 * (size_t)b + i % 3];
 	return shared > 1;
 }
+
+/* Cosine of two normals, either way, from which triangles are of one plane: within 4.5e-5 radians,
+ * far more than rounding turns a normal of no sliver. A guess. */
+static const double one_plane = 1 - 1e-9;
 
 /* The triangle beyond half-edge h in the plane of its own, or none (its own). */
 static uint32_t coplanar(const struct search *s, uint32_t h)
@@ -66,7 +71,7 @@ static uint32_t coplanar(const struct search *s, uint32_t h)
 
 	for (uint32_t u = s->g->start[edge]; u < s->g->start[edge + 1]; u++) {
 		uint32_t other = s->g->use[u] / 3;
-		if (other != h / 3 && fabs(v3_dot(s->normal[h / 3], s->normal[other])) > 1 - 1e-9)
+		if (other != h / 3 && fabs(v3_dot(s->normal[h / 3], s->normal[other])) > one_plane)
 			return other;
 	}
 	return h / 3;
@@ -136,7 +141,8 @@ static int emits(const struct model *m, uint32_t triangle)
 {
 	uint32_t material = m->surface.material[m->triangle.surface[triangle]];
 
-	return bsdf_emits(&m->material, material, FRONT) || bsdf_emits(&m->material, material, BACK);
+	return bsdf_emits(&m->material, material, FRONT) ||
+	       bsdf_emits(&m->material, material, BACK);
 }
 
 /* Notes that triangle b meets the plane of triangle a between p and q. The light that a lamp
@@ -146,7 +152,8 @@ static int add_cut(struct search *s, uint32_t a, uint32_t b, const double p[3],
 {
 	const double *given[2] = { p, q }, *n = s->normal[a];
 	struct cut c = { .plane = geo_sets_find(s->plane, b), .flush = flush,
-	                 .shortest = fine || emits(s->m, b) ? s->limits->fine : s->limits->shortest };
+	                 .shortest = fine || emits(s->m, b) ? s->limits->fine
+	                                                    : s->limits->shortest };
 	double d[3];
 
 	for (int i = 0; i < 2; i++) {

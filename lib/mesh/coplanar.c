@@ -92,7 +92,8 @@ static uint32_t holder(const struct search *s, uint32_t t, uint32_t surface, con
 	return t;
 }
 
-/* Is t so thin that its neighbours seem to cover it? */
+/* Is t so thin that its neighbours seem to cover it? Its height is less than four times what points
+ * of a cut may be apart and still be one: a guess. */
 static int thin(const struct search *s, uint32_t t)
 {
 	double n[3];
@@ -111,6 +112,7 @@ static uint32_t cover(const struct search *s, uint32_t t, uint32_t surface)
 		v3_mad(centre, 1. / 3, corner(s->m, t, k), centre);
 	for (int k = 0; k < 3; k++) {
 		v3_sub(centre, corner(s->m, t, k), x);
+		/* 1 % of the way to the centre, a guess: past the surface's border. */
 		v3_mad(corner(s->m, t, k), 1e-2, x, x);
 		if (holder(s, t, surface, x) == t)
 			return t;

@@ -11,7 +11,8 @@
 static int assign_regions(struct division *d, size_t *regions, struct err *e)
 {
 	uint32_t *region = mem_new(d->m->triangle.n, sizeof *region, "regions", e);
-	int status = region ? mesh_find_regions(d->m, d->size, d->cos_cone, region, &d->region, regions, e)
+	int status = region ? mesh_find_regions(d->m, d->size, d->cos_cone, region, &d->region,
+	                                        regions, e)
 	                    : -1;
 
 	d->element_region = mem_new(d->m->element.n, sizeof *d->element_region, "regions", e);

@@ -7,7 +7,9 @@
 
 /* Thick: 1e-6 of the scene is far above the rounding of float32 positions and far below
  * an element. Fractions of the element size: what is much smaller than an element does
- * not pay for elements of its own, and a gap much narrower shows in none. */
+ * not pay for elements of its own, and a gap much narrower shows in none. That is why they are
+ * fractions; which ones is a guess (man/mesh.1 states close and shortest). 0x1p-48: sixteen times
+ * the rounding of the largest coordinate; 1e-8 is rounding, as in bisect.c. */
 static struct imprint_limits limits_of(const struct model *m, double size)
 {
 	double lo[3], hi[3], largest = 0, diagonal = 0;

@@ -59,11 +59,12 @@ struct pieces {
  * towards Delaunay's criterion and refined elsewhere. No vertex ever lies inside an edge of
  * its surface. O(contacts x pieces of a triangle) at worst. p zeroed, to be freed in any
  * case. 0, or -1 and e. */
-int mesh_constrain_edges(const struct model *m, const struct half_edges *g, const struct contacts *c,
+int mesh_constrain_edges(const struct model *m, const struct half_edges *g,
+                         const struct contacts *c,
                          const struct imprint_limits *limits, struct pieces *p, struct err *e);
 
-/* imprint_replace.c: pieces become the triangles of m, their vertices its vertices. These are doubled
- * along lines, so that nothing that follows shared edges or vertices crosses them.
+/* imprint_replace.c: pieces become the triangles of m, their vertices its vertices. These are
+ * doubled along lines, so that nothing that follows shared edges or vertices crosses them.
  * *lines = edges of pieces along lines. 0, or -1 and e. O(n log n). */
 int mesh_imprint_replace(struct model *m, struct pieces *p, size_t *lines, struct err *e);
 

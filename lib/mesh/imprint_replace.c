@@ -135,7 +135,8 @@ static int replace(struct model *m, const struct pieces *p, struct parts *parts,
 		size_t t = part->triangle;
 		double w[3][3];
 		for (int k = 0; k < 3; k++)
-			weights(m, t, (const double *)p->vertex.data + 3 * (size_t)part->v[k], w[k]);
+			weights(m, t, (const double *)p->vertex.data + 3 * (size_t)part->v[k],
+			        w[k]);
 		surface[i] = m->triangle.surface[t];
 		if (uv)
 			interpolate(&m->triangle.uv[6 * t], 2, w, &uv[6 * i]);

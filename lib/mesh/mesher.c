@@ -226,8 +226,8 @@ static int divide_further(struct model *m, const struct mesh_options *o,
 	for (size_t i = 0; before && i < m->element.n; i++)
 		before[i] = old->element.patch[(*origin)[i]];
 	int status = before && patch &&
-	             !mesh_split_patches(m, r->patch_size, cos_cone, before, old->patch.n, plan->patch,
-	                                 patch, &patches, e) &&
+	             !mesh_split_patches(m, r->patch_size, cos_cone, before, old->patch.n,
+	                                 plan->patch, patch, &patches, e) &&
 	             !mesh_order_elements(m, patch, patches, *origin, e) ? 0 : -1;
 	free(before);
 	free(patch);

@@ -2,7 +2,7 @@
  *
  * In: a model with materials, surfaces, vertices, triangles, triangle_surface,
  * triangle_uv and triangle_normal (the last two may be NULL) filled.
- * Out: the same model cleaned and with every array of lib/model.h filled.
+ * Out: the same model cleaned and with every array of lib/data/model.h filled.
  * O(n log n) in the elements made. */
 #ifndef TWOPASS_MESHER_H
 #define TWOPASS_MESHER_H
@@ -29,6 +29,8 @@ struct mesh_options {
 	const struct progress *progress; /* or NULL */
 };
 
+/* Patches of 5 % of the diagonal, elements of 4 %, a cone of 20 degrees: guesses, which
+ * tests/bench/RESULTS.md compares with others for elements and refinement. */
 #define MESH_OPTIONS_DEFAULT \
 	((struct mesh_options){ .patch = { .05, 1 }, .element = { .04, 1 }, \
 	                          .element_within_patch = 1, .normal_cone = 20 })

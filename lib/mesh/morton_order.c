@@ -193,8 +193,8 @@ static int move_origins(uint32_t *origin, const struct place *place, size_t n, s
 	return 0;
 }
 
-static int order(struct model *m, const struct morton_curve *c, const uint32_t *patch, size_t patches,
-                 const uint32_t *rank, uint32_t *origin, struct err *e)
+static int order(struct model *m, const struct morton_curve *c, const uint32_t *patch,
+                 size_t patches, const uint32_t *rank, uint32_t *origin, struct err *e)
 {
 	struct place *place = sort_elements(m, c, patch, rank, e);
 	int status = place && (!origin || !move_origins(origin, place, m->element.n, e)) &&

@@ -39,7 +39,7 @@ static const double *vertex(const struct tracer *t, uint32_t v)
 
 /* Are all corners within 1e-5 of the patch's extent of its mean plane? Finer than
  * any error that formulas for plane polygons are quoted with, coarser than what
- * float32 positions do to a plane. */
+ * float32 positions do to a plane; a guess in between. */
 static int planar(struct tracer *t, uint32_t begin, uint32_t end)
 {
 	const struct model *m = t->m;
@@ -93,7 +93,8 @@ static int collect_arcs(struct tracer *t, uint32_t n)
 	memset(t->done.data, 0, t->done.n);
 	struct arc *a = t->arc.data;
 	for (uint32_t h = 0; h < 3 * n; h++)
-		a[h] = (struct arc){ geo_half_edge_from(t->element, h), geo_half_edge_to(t->element, h), h };
+		a[h] = (struct arc){ geo_half_edge_from(t->element, h),
+			             geo_half_edge_to(t->element, h), h };
 	qsort(a, t->arc.n, sizeof *a, compare_arcs);
 	for (size_t i = 1; i < t->arc.n; i++)
 		if (!compare_arcs(&a[i], &a[i - 1]))

@@ -12,9 +12,12 @@
 
 #define NONE UINT32_MAX
 
-/* Uses of an edge beyond which it makes no neighbours, a count: pairs of them are looked at, and
- * surfaces have two. A guess. */
+/* Uses of an edge beyond which it makes no neighbours: so many coincident edges are of a heap of
+ * things rather than of a surface, and comparing all is quadratic. A count; a guess. */
 enum { CROWD = 8 };
+
+/* Rounding, as ratios: of a cosine, and of a length against the patch size. */
+static const double cosine_slack = 1e-9, length_slack = 1e-6;
 
 struct group {
 	double lo[3], hi[3];     /* in the region's frame */
@@ -196,7 +199,7 @@ static int find_borders(struct merger *g, uint32_t group)
 /* Are all normals of the group within the cone about n? */
 static int within_cone(const struct merger *g, const struct group *a, const double n[3])
 {
-	double bound = (g->d->cos_cone - 1e-9) * v3_length(n);
+	double bound = (g->d->cos_cone - cosine_slack) * v3_length(n);
 
 	for (uint32_t i = a->first; i != NONE; i = g->next[i]) {
 		const double *area = &g->d->area[3 * (size_t)i];
@@ -213,7 +216,7 @@ static int fits(const struct merger *g, const struct group *a, const struct grou
 
 	for (int k = 0; k < 3; k++) {
 		double length = fmax(a->hi[k], b->hi[k]) - fmin(a->lo[k], b->lo[k]);
-		if (length > fmax(g->d->size, b->hi[k] - b->lo[k]) * (1 + 1e-6))
+		if (length > fmax(g->d->size, b->hi[k] - b->lo[k]) * (1 + length_slack))
 			return 0;
 	}
 	v3_mad(a->normal, 1, b->normal, n);

@@ -9,9 +9,14 @@
 #include "lib/base/vec.h"
 #include "lib/mesh/stages.h"
 
-/* Elements of a patch that is halved, for each half, a count: fewer make halves whose shape says
- * more of the elements than of the patch. A guess. */
+/* Elements that each half of a patch that is halved has on average, at least: with fewer, a patch
+ * costs as much as its elements. A count; a guess. */
 enum { ELEMENTS_MIN = 4 };
+
+/* Rounding, as ratios: of positions along a piece, of cosines, of lengths or scores that are
+ * compared; and of a variance, over the sum of squares that it is the difference of. */
+static const double position_slack = 1e-9, cosine_slack = 1e-9, length_slack = 1e-6;
+static const double variance_slack = 1e-12;
 
 /* Connected elements order[begin, end) of a region and the box, in its frame, that
  * they stand for. The box is halved exactly; elements that straddle the cut belong
@@ -102,7 +107,7 @@ static int push_connected(struct divider *d, uint32_t begin, uint32_t end,
  * however the scene is turned and scaled. */
 static double slack(const struct piece *p, int axis)
 {
-	return 1e-9 * (p->hi[axis] - p->lo[axis]);
+	return position_slack * (p->hi[axis] - p->lo[axis]);
 }
 
 /* Divides a piece, and its box, at centroid . axis = at. */
@@ -127,11 +132,11 @@ static int cut(struct divider *d, const struct piece *p, int axis, double at)
 /* The longest side of the box that exceeds the patch size, or -1. */
 static int too_long(const struct divider *d, const struct piece *p)
 {
-	double longest = d->d.size * (1 + 1e-6);
+	double longest = d->d.size * (1 + length_slack);
 	int axis = -1;
 
 	for (int k = 0; k < 3; k++)
-		if (p->hi[k] - p->lo[k] > longest * (axis < 0 ? 1 : 1 + 1e-6)) {
+		if (p->hi[k] - p->lo[k] > longest * (axis < 0 ? 1 : 1 + length_slack)) {
 			longest = p->hi[k] - p->lo[k];
 			axis = k;
 		}
@@ -144,7 +149,7 @@ static int longest_axis(const struct piece *p)
 	int axis = 0;
 
 	for (int k = 1; k < 3; k++)
-		if (p->hi[k] - p->lo[k] > (p->hi[axis] - p->lo[axis]) * (1 + 1e-6))
+		if (p->hi[k] - p->lo[k] > (p->hi[axis] - p->lo[axis]) * (1 + length_slack))
 			axis = k;
 	return axis;
 }
@@ -160,7 +165,7 @@ static int too_curved(const struct divider *d, const struct piece *p)
 	for (uint32_t i = p->begin; i < p->end; i++) {
 		const double *n = &d->d.area[3 * (size_t)d->order[i]];
 		double length = v3_length(n);
-		if (!(v3_dot(n, mean) >= (bound - 1e-9 * v3_length(mean)) * length))
+		if (!(v3_dot(n, mean) >= (bound - cosine_slack * v3_length(mean)) * length))
 			return 1;
 	}
 	return 0;
@@ -194,7 +199,7 @@ static struct bend measure_bend(const struct divider *d, const struct piece *p, 
 	}
 	v3_mad(sxn, -sx / n, sn, c);
 	double variance = sxx - sx * sx / n;
-	if (variance > 1e-12 * sxx)
+	if (variance > variance_slack * sxx)
 		b.score = v3_length(c) / sqrt(variance);
 	return b;
 }
@@ -207,7 +212,8 @@ static int cut_bend(struct divider *d, const struct piece *p)
 
 	for (int k = 0; k < 3; k++) {
 		struct bend b = measure_bend(d, p, k);
-		if (b.hi - b.lo > 4 * slack(p, k) && (axis < 0 || b.score > best.score * (1 + 1e-6))) {
+		if (b.hi - b.lo > 4 * slack(p, k) &&
+		    (axis < 0 || b.score > best.score * (1 + length_slack))) {
 			best = b;
 			axis = k;
 		}

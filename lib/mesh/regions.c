@@ -10,8 +10,21 @@
 #include "lib/geometry/half_edge.h"
 #include "lib/mesh/stages.h"
 
-/* Uses of an edge that are compared with one another, a count; surfaces have two. A guess. */
+/* Uses of an edge that are compared with one another, each with so many after it: all would be
+ * quadratic. A count; a guess. */
 enum { CROWD = 8 };
+
+/* Coplanar neighbours: the cosine of their normals is above the first, 26 degrees, which slivers'
+ * normals may be off by, and the height of the smaller one's apex, over its distance, up to the
+ * second (and what float32 positions are off by). Guesses. */
+static const double coplanar_cosine = .9, coplanar_height = 1e-6;
+
+/* Length of a sum of area vectors over the area, above which it has a direction. A guess. */
+static const double has_direction = .1;
+
+/* A plane piece stays by itself if it is wider than the first of these times the patch size, or
+ * times that fraction (the second) of the scene's diagonal where it is smaller. Guesses. */
+static const double large_width = .25, large_in_scene = .1;
 
 struct finder {
 	const struct model *m;
@@ -34,7 +47,8 @@ static void for_neighbours(struct finder *f, void (*join)(struct finder *, uint3
 	for (size_t i = 0; i < f->g.n; i++)
 		for (uint32_t u = f->g.start[i]; u < f->g.start[i + 1]; u++)
 			for (uint32_t v = u + 1; v < f->g.start[i + 1] && v <= u + CROWD; v++)
-				if (geo_half_edge_from(tri, f->g.use[u]) == geo_half_edge_to(tri, f->g.use[v]))
+				if (geo_half_edge_from(tri, f->g.use[u]) ==
+				    geo_half_edge_to(tri, f->g.use[v]))
 					join(f, f->g.use[u], f->g.use[v]);
 }
 
@@ -56,7 +70,8 @@ static void join_coplanar(struct finder *f, uint32_t g, uint32_t h)
 	v3_sub(&m->vertex[3 * (size_t)geo_half_edge_apex(m->triangle.corner, swap ? g : h)],
 	       &m->vertex[3 * (size_t)geo_half_edge_from(m->triangle.corner, g)], d);
 	v3_normalise(n);
-	if (cosine(a, b) > .9 && fabs(v3_dot(n, d)) <= 1e-6 * v3_length(d) + f->noise)
+	if (cosine(a, b) > coplanar_cosine &&
+	    fabs(v3_dot(n, d)) <= coplanar_height * v3_length(d) + f->noise)
 		geo_sets_join(f->plane, g / 3, h / 3);
 }
 
@@ -90,15 +105,15 @@ static void mark_large(struct finder *f, double width, double *sum)
 		double *s = &sum[5 * (size_t)geo_sets_find(f->plane, t)];
 		double weight = v3_length(&f->area[3 * (size_t)t]) / 3;
 		for (size_t k = 0; k < 3; k++)
-			v3_mad(s, weight, &m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)t + k]],
-			       s);
+			v3_mad(s, weight,
+			       &m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)t + k]], s);
 		s[3] += 3 * weight;
 	}
 	for (uint32_t t = 0; t < m->triangle.n; t++) {
 		double *s = &sum[5 * (size_t)geo_sets_find(f->plane, t)], d[3];
 		for (size_t k = 0; k < 3; k++) {
-			v3_mad(&m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)t + k]], -1 / s[3],
-			       s, d);
+			v3_mad(&m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)t + k]],
+			       -1 / s[3], s, d);
 			s[4] = fmax(s[4], v3_length(d));
 		}
 	}
@@ -154,7 +169,8 @@ static void find_guides(const struct finder *f, const uint32_t *region, struct g
 			struct guide *best = &guide[region[h / 3]], new = { .half = h };
 			double d[3];
 			v3_sub(&m->vertex[3 * (size_t)geo_half_edge_to(m->triangle.corner, h)],
-			       &m->vertex[3 * (size_t)geo_half_edge_from(m->triangle.corner, h)], d);
+			       &m->vertex[3 * (size_t)geo_half_edge_from(m->triangle.corner, h)],
+			       d);
 			new.length = coarse(v3_dot(d, d));
 			new.boundary = (uint8_t)on_boundary(f, region, i, u);
 			if (new.boundary > best->boundary ||
@@ -174,6 +190,7 @@ static void frame_along(const struct model *m, uint32_t half, const double norma
 	       &m->vertex[3 * (size_t)geo_half_edge_from(m->triangle.corner, half)], u);
 	v3_normalise(u);
 	v3_mad(u, -v3_dot(u, n), n, u);
+	/* The edge is as good as parallel to the normal: any frame will do. */
 	if (v3_normalise(u) < 1e-3)
 		v3_frame(n, u, axis[1]);
 	v3_cross(n, u, axis[1]);
@@ -205,7 +222,7 @@ static void propose(const struct finder *f, uint32_t half, const double sum[4],
 	const double *own = &f->area[3 * (size_t)(half / 3)];
 	double n[3];
 
-	memcpy(n, v3_length(sum) > .1 * sum[3] ? sum : own, sizeof n);
+	memcpy(n, v3_length(sum) > has_direction * sum[3] ? sum : own, sizeof n);
 	v3_normalise(n);
 	for (uint32_t k = 0; k < 3; k++) {
 		c[k] = (struct candidate){ .lo = { INFINITY, INFINITY },
@@ -284,8 +301,7 @@ int mesh_find_regions(const struct model *m, double size, double cos_cone, uint3
 	f.noise = 0x1p-23 * v3_length(diagonal);
 	triangle_areas(&f);
 	for_neighbours(&f, join_coplanar);
-	/* Large: some third of a patch across, or of a tenth of the scene. */
-	mark_large(&f, .25 * fmin(size, .1 * v3_length(diagonal)), sum);
+	mark_large(&f, large_width * fmin(size, large_in_scene * v3_length(diagonal)), sum);
 	memcpy(f.region, f.plane, n * sizeof *f.region);
 	for_neighbours(&f, join_smooth);
 	if (number_regions(&f, region, regions, count, e))

@@ -3,13 +3,21 @@
 #include <math.h>
 #include <string.h>
 
-/* Height of the flattest piece that flips make, as a fraction of the least distance between
- * contacts: flatter ones have no normal that float32 vertices could tell. A guess. */
+/* Height of the flattest piece that flips make, a fraction of the least distance of points
+ * (`apart`): flips stay clear of what rounding turns over. A guess. */
 #define FLAT 1e-3
 
-/* Counts. Flips end by themselves in exact arithmetic: passes beyond 64, a guess, are rounding that
- * goes in circles. Three half-edges of so many pieces fit 32 bits. */
-enum { PASSES_MAX = 64, PIECES_MAX = 1 << 28 };
+/* Sum of cotangents that an edge must exceed to be flipped: more than their rounding, lest flips
+ * go back and forth. A guess. */
+static const double flip_slack = 1e-6;
+
+enum {
+	/* Passes of flips over the pieces of a triangle, at most: they end by themselves, but for
+	 * rounding. A guess, far above what is needed. */
+	PASSES_MAX = 64,
+	/* Half-edges, three a piece, are numbered by 32 bits: room for five times as many. */
+	PIECES_MAX = 1 << 28
+};
 
 void mesh_set_triangle(struct triangulation *c, uint32_t triangle)
 {
@@ -206,7 +214,8 @@ void mesh_flip_edges(struct triangulation *c)
 		for (uint32_t i = c->triangle; i != RIM; i = piece_of(c, 3 * i)->next)
 			for (uint32_t h = 3 * i; h < 3 * i + 3; h++)
 				if (mesh_may_flip(c, h) &&
-				    cotangent(c, h) + cotangent(c, get_half(c, h).across) < -1e-6) {
+				    cotangent(c, h) + cotangent(c, get_half(c, h).across) <
+				    -flip_slack) {
 					mesh_flip_edge(c, h);
 					changed = 1;
 				}

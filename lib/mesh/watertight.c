@@ -16,7 +16,8 @@ static int count_opposite(const struct model *m, struct mesh_report *r, struct e
 		uint32_t a = g.use[g.start[i]], b = g.use[g.start[i + 1] - 1];
 		uint32_t s = m->triangle.surface[a / 3];
 		if (g.start[i + 1] - g.start[i] != 2 ||
-		    geo_half_edge_from(m->triangle.corner, a) != geo_half_edge_from(m->triangle.corner, b))
+		    geo_half_edge_from(m->triangle.corner, a) !=
+		    geo_half_edge_from(m->triangle.corner, b))
 			continue;
 		r->total.opposite++;
 		if (s < r->surfaces)
