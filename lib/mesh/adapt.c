@@ -24,7 +24,6 @@ static const double once = .4;
  * of variances: ten standard errors; a guess. */
 static const double doubtful = 100;
 
-/* Counts. BISECTIONS of a range of 1e12 find a bound to a double's 1e-12; the others are guesses. */
 enum {
 	/* Elements that each part of a halved patch has, at least: one more than patches.c asks
 	 * for (ELEMENTS_MIN), as cuts do not part them evenly. A guess. */
