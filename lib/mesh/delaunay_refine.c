@@ -11,8 +11,6 @@
  * to end (he proves it to 20.7 degrees). Taken from there, not measured. */
 #define LEAST_SINE .342
 
-/* Counts, guesses that end what rounding might keep going: rounds of a triangle, steps of a walk;
- * and a length. */
 enum {
 	/* Passes over the pieces of a triangle, at most, and pieces that a walk leads through: both
 	 * end by themselves, but for rounding. Guesses, far above what is needed. */
