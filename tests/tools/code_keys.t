@@ -1,4 +1,5 @@
 #!/bin/sh
+# tier: slow
 # Keys follow the code: whoever changes a stage sees that stage run again, and the later ones
 # as far as what they read is another; whoever changes comments and spacing sees none. The
 # programs are built from a copy of the sources, with the objects that are there.
