@@ -8,8 +8,8 @@
 #include "lib/base/mem.h"
 #include "lib/base/vec.h"
 
-/* LANES: doubles of an AVX2 register. CHANNELS_MAX: a count; BANDS_MAX bands of 12 light groups,
- * or 3 of 128; arrays of so many stand on the stack. A guess at what scenes need. */
+/* Counts. Four doubles are a vector of AVX. 384 channels are 128 light groups of RGB or 12 of
+ * BANDS_MAX bands: a guess at what anybody mixes. It bounds arrays on stacks (3 kB). */
 enum { LANES = 4, CHANNELS_MAX = 384, VECTORS_MAX = CHANNELS_MAX / LANES };
 
 /* For loops that are to be made anew for each set of constants. */
@@ -28,7 +28,7 @@ static inline size_t lanes_vectors(size_t channels)
  * memory. */
 static inline lanes *lanes_new(size_t n, void **room, const char *what, struct err *e)
 {
-	enum { LINE = 64 };          /* calloc aligns to 16 bytes only */
+	enum { LINE = 64 };          /* bytes; calloc aligns to 16 only */
 
 	*room = mem_new(n + LINE / sizeof(lanes), sizeof(lanes), what, e);
 	return *room ? (lanes *)(((uintptr_t)*room + LINE - 1) & ~(uintptr_t)(LINE - 1)) : NULL;

@@ -4,7 +4,8 @@
 
 struct err {
 	int set;
-	char text[1024];
+	char text[1024];   /* bytes; names are cut to 100 where they go in, paths are short enough
+	                      as a guess */
 };
 
 /* Records "what is wrong" (printf style, without program name or newline;

@@ -20,7 +20,7 @@ int err_check_starts(const char *name, const uint64_t *start, size_t n, uint64_t
 		               " and should from 0 to %" PRIu64, name, start[0], start[n], end);
 	for (size_t i = 0; i < n; i++)
 		if (start[i + 1] < start[i] || start[i + 1] - start[i] < least)
-			return err_set(e, "array %s: values %zu and %zu do not ascend as they should",
-			               name, i, i + 1);
+			return err_set(e, "array %s: values %zu and %zu do not ascend as they "
+			               "should", name, i, i + 1);
 	return 0;
 }

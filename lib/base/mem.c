@@ -7,10 +7,13 @@
 #include <string.h>
 #include <sys/mman.h>
 
-/* Bytes. LARGE_PAGE is x86's. A heap of 24 MiB in large pages is taken at the start, and blocks of
- * 32 MiB and more are mappings of their own, in large pages too: guesses between what a view and
- * what a large solution take. `perf stat -e dTLB-load-misses trace` shows what they are for. */
+/* Bytes. A large page is x86-64's. The heap of 24 MB that is begun with and kept is a guess at what
+ * small scenes take. What is larger than 32 MB is mapped by itself: the most that glibc allows. */
 enum { LARGE_PAGE = 2 << 20, HEAP = 24 << 20, OWN_MAPPING = 32 << 20 };
+
+/* A count of elements that a growable array begins with, so that the first few appended ones do
+ * not each move it: a guess. */
+enum { ROOM_AT_FIRST = 16 };
 
 /* Asks for large pages where they fit in between p and p + bytes, not touched yet. */
 static void use_large_pages(void *p, size_t bytes)
@@ -49,7 +52,7 @@ int mem_reserve(struct array *a, size_t more, size_t size, struct err *e)
 {
 	if (more <= a->capacity - a->n)
 		return 0;
-	size_t want = a->n + more, cap = a->capacity + a->capacity / 2 + 16;
+	size_t want = a->n + more, cap = a->capacity + a->capacity / 2 + ROOM_AT_FIRST;
 	if (cap < want)
 		cap = want;
 	void *p = NULL;

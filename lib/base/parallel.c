@@ -8,7 +8,7 @@
 #include <xmmintrin.h>
 #endif
 
-/* A count, that of -j at most: threads stand in an array on the stack. */
+/* A count, which bounds arrays on the stack: a guess at the processors of any one machine. */
 enum { MAX_THREADS = 256 };
 
 struct loop {

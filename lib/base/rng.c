@@ -8,6 +8,7 @@ static const struct {
 } joe_kuo[] = { { 1, 0, { 1 } }, { 2, 1, { 1, 3 } }, { 3, 1, { 1, 3, 1 } },
 	{ 3, 2, { 1, 1, 1 } }, { 4, 1, { 1, 1, 3, 3 } } };
 
+/* [dimensions][bits of an index] */
 static uint32_t direction[6][32];
 
 static void fill_directions(void) __attribute__((constructor));

@@ -175,7 +175,8 @@ static inline int ff_next(struct ff_cursor *c, struct ff_span *s)
 		c->entry = s->entry + s->count;
 		return 1;
 	}
-	for (; c->entry < c->end && ff_word(c->f, c->word) == s->column + 2 * s->count; c->entry++) {
+	for (; c->entry < c->end && ff_word(c->f, c->word) == s->column + 2 * s->count;
+	     c->entry++) {
 		s->count++;
 		c->word++;
 	}

@@ -7,10 +7,11 @@
 #include "lib/base/index_check.h"
 #include "lib/base/mem.h"
 
-/* How well stored rows close: far above rounding, far below any real error.
- * A fraction of a row; a guess. */
+/* Part of a row's flux by which stored rows may fail to close: a guess, far above the rounding of
+ * sums in float64 and far below the error of any sampling. */
 static const double closure_slack = 1e-9;
-/* Directions are float32. */
+/* By how much the length of a direction may differ from 1. Directions are float32, which rounds to
+ * 1e-7: a guess that lets pass what other programs write, and no error that matters. */
 static const double unit_slack = 1e-3;
 
 static int not_negative_f32(const char *name, const float *v, size_t n, struct err *e)
@@ -78,8 +79,8 @@ static int check_chains(const struct ff *f, size_t materials, struct err *e)
 			if (f->chain.count[i] == 0)
 				return err_set(e, "array chain_count: value %" PRIu64 " is 0", i);
 			if (i > f->chain.start[c] && f->chain.event[i] <= f->chain.event[i - 1])
-				return err_set(e, "array chain_event: values %" PRIu64 " and %" PRIu64
-				               " do not ascend", i - 1, i);
+				return err_set(e, "array chain_event: values %" PRIu64 " and %"
+				               PRIu64 " do not ascend", i - 1, i);
 		}
 	return 0;
 }
@@ -130,7 +131,8 @@ static int check_row_chains(const struct ff *f, size_t r, struct err *e)
 	for (uint64_t b = begin + 1; b < f->row.block[r + 1]; b++) {
 		uint64_t n = chain_length(f, f->block.chain[b]);
 		if (n == 0 || n < length)
-			return err_set(e, "array block_chain: block %" PRIu64 " is out of order", b);
+			return err_set(e, "array block_chain: block %" PRIu64 " is out of order",
+			               b);
 		length = n;
 	}
 	return 0;
@@ -179,7 +181,8 @@ static int check_span(const struct columns *c, uint64_t word, uint32_t first, ui
 	uint64_t end = (uint64_t)first + 2 * ((uint64_t)count - 1);
 
 	if (count == 0)
-		return err_set(e, "array column: value %" PRIu64 " is 0 and counts columns", word + 1);
+		return err_set(e, "array column: value %" PRIu64 " is 0 and counts columns",
+		               word + 1);
 	if (first >> 1 >= c->limit)
 		return err_set(e, "array column: value %" PRIu64 " is %" PRIu32 ", which must be "
 		               "below %" PRIu64, word, first, 2 * c->limit);
@@ -207,14 +210,15 @@ static int check_spans(const struct columns *c, uint64_t b, uint64_t w, uint64_t
 
 	for (; left; w += 2) {
 		if (words(f) - w < 2)
-			return err_set(e, "array block_column: block %" PRIu64 " ends beyond the last "
-			               "column", b);
+			return err_set(e, "array block_column: block %" PRIu64 " ends beyond the "
+			               "last column", b);
 		uint32_t count = ff_word(f, w + 1);
 		if (check_span(c, w, ff_word(f, w), count, &last, e))
 			return -1;
 		if (count > left)
-			return err_set(e, "array column: value %" PRIu64 " is %" PRIu32 ", with which "
-			               "block %" PRIu64 " has more columns than values", w + 1, count, b);
+			return err_set(e, "array column: value %" PRIu64 " is %" PRIu32 ", with "
+			               "which block %" PRIu64 " has more columns than values",
+			               w + 1, count, b);
 		left -= count;
 	}
 	return 0;
@@ -226,8 +230,8 @@ static int check_list(const struct columns *c, uint64_t b, uint64_t w, uint64_t 
 	uint64_t last = 0;
 
 	if (n > words(c->f) - w)
-		return err_set(e, "array block_column: block %" PRIu64 " ends beyond the last column",
-		               b);
+		return err_set(e, "array block_column: block %" PRIu64 " ends beyond the last "
+		               "column", b);
 	for (uint64_t end = w + n; w < end; w++)
 		if (check_span(c, w, ff_word(c->f, w), 1, &last, e))
 			return -1;
@@ -240,8 +244,8 @@ static int check_columns(const struct columns *c, uint64_t b, struct err *e)
 	uint64_t first = ff_first_word(f, b), n = f->block.start[b + 1] - f->block.start[b];
 
 	if (first > words(f))
-		return err_set(e, "array block_column: block %" PRIu64 " begins beyond the last column",
-		               b);
+		return err_set(e, "array block_column: block %" PRIu64 " begins beyond the last "
+		               "column", b);
 	return ff_has_spans(f, b) ? check_spans(c, b, first, n, e) : check_list(c, b, first, n, e);
 }
 
@@ -260,7 +264,8 @@ static int check_values(const struct ff *f, uint64_t b, double *sum, struct err 
 		return 0;
 	for (uint64_t i = f->block.start[b]; i < f->block.start[b + 1]; i++)
 		if (!(ff_value(f, i) >= 0 && isfinite(ff_value(f, i))))
-			return err_set(e, "array value: value %" PRIu64 " is %g", i, ff_value(f, i));
+			return err_set(e, "array value: value %" PRIu64 " is %g", i,
+			               ff_value(f, i));
 	return err_set(e, "array value: block %" PRIu64 " sums to %g", b, *sum);
 }
 
@@ -286,7 +291,8 @@ static int check_entries(const struct ff *f, const struct ff_scene *s, struct er
 {
 	struct columns c = { .f = f, .limit = f->to_patches ? s->patches : s->elements };
 	int failed = !f->to_patches &&
-	             !(c.patch_of = mem_new(s->elements, sizeof *c.patch_of, "patches of elements", e));
+	             !(c.patch_of = mem_new(s->elements, sizeof *c.patch_of,
+	                                    "patches of elements", e));
 
 	for (size_t p = 0; c.patch_of && p < s->patches; p++)
 		for (uint32_t i = s->patch_start[p]; i < s->patch_start[p + 1]; i++)
@@ -365,7 +371,8 @@ int ff_check(const struct ff *f, const struct ff_scene *s, struct err *e)
 	return check_scene(s, e) || check_part(f, s->patches, e) ||
 	       check_chains(f, s->materials, e) || check_rows(f, s, e) ||
 	       check_entries(f, s, e) ||
-	       err_check_below("arrival_target", f->arrival.target, f->arrival.n, 2 * s->patches, e) ||
+	       err_check_below("arrival_target", f->arrival.target, f->arrival.n,
+	                       2 * s->patches, e) ||
 	       unit_vectors("arrival_direction", f->arrival.direction, f->arrival.n, e) ||
 	       check_links(f, s, e) ? -1 : 0;
 }

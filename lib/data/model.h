@@ -8,7 +8,8 @@
 #include "lib/base/err.h"
 
 enum { FRONT = 0, BACK = 1 };
-/* A count: arrays of so many doubles stand on the stack. A guess, spectra by steps of 12 nm. */
+
+/* A count: a visible spectrum in steps of 10 nm is as many. It bounds arrays on stacks. A guess. */
 enum { BANDS_MAX = 32 };
 
 /* Which Phong lobe finite exponents mean (see lobe.h). */

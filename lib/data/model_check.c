@@ -11,7 +11,8 @@
 #include "lib/base/vec.h"
 
 static const double albedo_slack = MODEL_ALBEDO_SLACK;
-/* Rigid matrices come from float32 glTF numbers. */
+/* By how much dot products of a rigid matrix's columns may be off 0 and 1: a guess, a hundred
+ * roundings of float32, as matrices are products of glTF's float32 numbers. */
 static const double rigid_slack = 1e-5;
 
 static const char *side_name(size_t side)
@@ -105,8 +106,8 @@ static int check_one_sided(const struct materials *mt, size_t m, struct err *e)
 	for (int b = 0; mt->one_sided[m] && b < mt->bands; b++) {
 		size_t at = model_material_at(mt, m, FRONT) + (size_t)b;
 		if (mt->tau_d[at] > 0 || mt->tau_s[at] > 0)
-			return err_set(e, "array material_one_sided: material '%.100s' is one-sided "
-			               "but transmits light", mt->name[m]);
+			return err_set(e, "array material_one_sided: material '%.100s' is "
+			               "one-sided but transmits light", mt->name[m]);
 	}
 	return 0;
 }
@@ -144,13 +145,13 @@ static int check_light(const struct lights *l, size_t i, int bands, struct err *
 	if (l->kind[i] == LIGHT_SPOT
 	        ? !(cone[0] >= 0 && cone[0] <= cone[1] && cone[1] > 0 && cone[1] <= PI / 2)
 	        : cone[0] != 0 || cone[1] != 0)
-		return err_set(e, "array light_cone: light '%.100s': %g, %g are no cones", l->name[i],
-		               cone[0], cone[1]);
+		return err_set(e, "array light_cone: light '%.100s': %g, %g are no cones",
+		               l->name[i], cone[0], cone[1]);
 	for (int b = 0; b < bands; b++) {
 		double intensity = l->intensity[i * (size_t)bands + (size_t)b];
 		if (!(intensity >= 0 && isfinite(intensity)))
-			return err_set(e, "array light_intensity: light '%.100s', band %d: %g is no "
-			               "intensity", l->name[i], b, intensity);
+			return err_set(e, "array light_intensity: light '%.100s', band %d: %g is "
+			               "no intensity", l->name[i], b, intensity);
 	}
 	return 0;
 }
@@ -253,7 +254,8 @@ static int check_vertices_and_triangles(const struct model *m, struct err *e)
 static int check_elements(const struct model *m, struct err *e)
 {
 	if (err_check_below("element", m->element.corner, 3 * m->element.n, m->vertices, e) ||
-	    err_check_below("element_triangle", m->element.triangle, m->element.n, m->triangle.n, e))
+	    err_check_below("element_triangle", m->element.triangle, m->element.n,
+	                    m->triangle.n, e))
 		return -1;
 	for (size_t i = 0; i < m->element.n; i++) {
 		const uint32_t *c = &m->element.corner[3 * i];
@@ -271,7 +273,7 @@ static int check_elements(const struct model *m, struct err *e)
 
 struct walk {
 	const struct model *m;
-	uint8_t *split_seen, *element_seen;
+	uint8_t *split_reached, *element_reached;
 	int32_t *stack;    /* each split is pushed once at most */
 	size_t depth;
 };
@@ -281,16 +283,16 @@ static int reach(struct walk *w, int32_t at, size_t t, struct err *e)
 {
 	const struct model *m = w->m;
 	size_t i = at >= 0 ? (size_t)at : (size_t)~at;
-	uint8_t *seen = at >= 0 ? w->split_seen : w->element_seen;
+	uint8_t *reached = at >= 0 ? w->split_reached : w->element_reached;
 
 	if (i >= (at >= 0 ? m->splits : m->element.n))
 		return err_set(e, "array triangle_split or split: the tree of triangle %zu leads "
 		               "to %s %zu of %zu", t, at >= 0 ? "split" : "element", i,
 		               at >= 0 ? m->splits : m->element.n);
-	if (seen[i])
+	if (reached[i])
 		return err_set(e, "array triangle_split or split: %s %zu is reached twice",
 		               at >= 0 ? "split" : "element", i);
-	seen[i] = 1;
+	reached[i] = 1;
 	if (at >= 0)
 		w->stack[w->depth++] = at;
 	else if (m->element.triangle[i] != t)
@@ -320,20 +322,20 @@ static int check_splits(const struct model *m, struct err *e)
 	struct walk w = { .m = m };
 	int failed;
 
-	w.split_seen = mem_new(m->splits, 1, "split trees", e);
-	w.element_seen = mem_new(m->element.n, 1, "split trees", e);
+	w.split_reached = mem_new(m->splits, 1, "split trees", e);
+	w.element_reached = mem_new(m->element.n, 1, "split trees", e);
 	w.stack = mem_new(m->splits, sizeof *w.stack, "split trees", e);
-	failed = !w.split_seen || !w.element_seen || !w.stack;
+	failed = !w.split_reached || !w.element_reached || !w.stack;
 	for (size_t t = 0; t < m->triangle.n && !failed; t++)
 		failed = walk_tree(&w, t, e);
 	for (size_t i = 0; i < m->element.n && !failed; i++)
-		if (!w.element_seen[i])
+		if (!w.element_reached[i])
 			failed = err_set(e, "array split: no tree leads to element %zu", i);
 	for (size_t i = 0; i < m->splits && !failed; i++)
-		if (!w.split_seen[i])
+		if (!w.split_reached[i])
 			failed = err_set(e, "array split: no tree leads to split %zu", i);
-	free(w.split_seen);
-	free(w.element_seen);
+	free(w.split_reached);
+	free(w.element_reached);
 	free(w.stack);
 	return failed ? -1 : 0;
 }
@@ -364,8 +366,10 @@ static int check_patches(const struct model *m, struct err *e)
 static int check_loops(const struct model *m, struct err *e)
 {
 	return err_check_starts("patch_loop", m->patch.loop, m->patch.n, m->patch.loops, 0, e) ||
-	       err_check_starts("loop_start", m->patch.loop_start, m->patch.loops, m->patch.loop_indices, 3, e) ||
-	       err_check_below("loop_index", m->patch.loop_index, m->patch.loop_indices, m->vertices, e) ? -1 : 0;
+	       err_check_starts("loop_start", m->patch.loop_start, m->patch.loops,
+	                        m->patch.loop_indices, 3, e) ||
+	       err_check_below("loop_index", m->patch.loop_index, m->patch.loop_indices,
+	                       m->vertices, e) ? -1 : 0;
 }
 
 /* Element-sides are 32-bit, elements and splits share a signed 32-bit number. */

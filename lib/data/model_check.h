@@ -4,8 +4,8 @@
 
 #include "lib/data/model.h"
 
-/* Sums of coefficients up to 1 + this count as energy-conserving: coefficients of glTF are
- * decimals or float32, which are right to 1e-7. */
+/* An albedo: sums of coefficients up to 1 + this count as energy-conserving. A guess, some
+ * roundings of float32 (1.2e-7), of which files' colours are. */
 #define MODEL_ALBEDO_SLACK 1e-6
 
 /* Checks everything but the derived arrays, which need not be there: ranges of

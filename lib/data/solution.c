@@ -27,7 +27,8 @@ static int check_sizes(const struct model *m, const struct solution *s, struct e
 	if (s->bands != m->bands || s->element_sides != 2 * m->element.n ||
 	    s->patch_sides != 2 * m->patch.n || s->sources != model_sources(m) ||
 	    s->groups < 1)
-		return err_set(e, "array irradiance_direct: it is not that of the model's elements");
+		return err_set(e, "array irradiance_direct: it is not that of the model's "
+		               "elements");
 	if (s->groups > CHANNELS_MAX / (size_t)s->bands)
 		return err_set(e, "array irradiance_direct: more than %zu light groups",
 		               CHANNELS_MAX / (size_t)s->bands);
@@ -117,8 +118,9 @@ double solution_relative_rms(const struct model *m, const struct solution *s,
 
 void solution_free(struct solution *s)
 {
-	double *array[] = { s->irradiance.direct, s->irradiance.caustic, s->irradiance.indirect, s->error.sampling, s->error.sampling_direct, s->error.discretisation,
-		s->error.discretisation_direct,
+	double *array[] = { s->irradiance.direct, s->irradiance.caustic, s->irradiance.indirect,
+		s->error.sampling, s->error.sampling_direct,
+		s->error.discretisation, s->error.discretisation_direct,
 		s->unshot.emission, s->unshot.diffuse, s->unshot.link, s->shot, s->ledger };
 
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)

@@ -37,7 +37,7 @@ struct unshot {
 	                              and ideal events so far, then the rest */
 };
 
-/* Index of element-side s, band b, group g: ((g 2E + s) bands + b). The solver keeps
+/* Index of element-side s, band b, group g: ((g 2E + s) bands + b). Shooting keeps
  * groups and bands together, as channels: g bands + b. */
 struct solution {
 	size_t groups;             /* light groups */
@@ -49,11 +49,11 @@ struct solution {
 	struct irradiance irradiance; /* [groups][2E][bands] */
 	struct irradiance_error error;
 
-	/* The solver's state, for shoot --resume: what is still to be shot, what each
+	/* The state of shooting, for shoot --resume: what is still to be shot, what each
 	 * row has sent so far, where the rest went. */
 	size_t patch_sides;        /* 2 P */
 	size_t sources;            /* 2 P + L, punctual lights behind patch-sides */
-	size_t links;              /* of all shards, in the solver's order */
+	size_t links;              /* of all shards, in the order in which shooting puts them */
 	size_t rows;               /* of all shards, in order */
 	struct unshot unshot;
 	double *shot;              /* [rows][2][channels] flux sent, split as unshot.link */

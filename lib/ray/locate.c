@@ -5,8 +5,9 @@
 
 #include "lib/base/mem.h"
 
-/* Cells of a triangle's grid for each of its elements, and along an edge of it at most: counts,
- * guesses. Most cells then lie within one element, and a grid takes at most 16 MB. */
+/* Counts: cells of the grid for each element, on average, and the most along an edge (16 MB for a
+ * triangle). Few cells name splits, from where elements are looked for by steps; many do not fit in
+ * the cache. Guesses. */
 enum { CELLS_AN_ELEMENT = 16, SIZE_MAX_CELLS = 2048 };
 
 /* Cells along an edge of a triangle of k elements: a power of two, so that the
@@ -73,7 +74,7 @@ struct square {
 /* The weights that the corners of a square have in a node. Returns how many there are. */
 static int square_weights(const struct locator_node *f, const struct square *q, double w[4][3])
 {
-	const double in = 1e-6;
+	const double in = 1e-6; /* of a cell: a guess, above rounding, below any element */
 	int corners = 0;
 
 	for (int k = 0; k < 4; k++) {

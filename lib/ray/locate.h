@@ -33,7 +33,8 @@ void ray_locator_free(struct locator *l);
  * common edge) for weights x, y of the triangle's corners 1 and 2, in two steps, so that
  * a loop over many hits can ask for the memory of each ahead: what is known of a hit's
  * place, and the way down from there. */
-static inline const int32_t *ray_locate_begin(const struct locator *l, uint32_t tri, float x, float y)
+static inline const int32_t *ray_locate_begin(const struct locator *l, uint32_t tri, float x,
+                                              float y)
 {
 	int32_t root = l->root[tri];
 

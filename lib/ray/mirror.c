@@ -8,11 +8,12 @@
 #include "lib/base/vec.h"
 #include "lib/scatter/bsdf.h"
 
-/* Planes beyond which images cost more than rays, a count; a guess. */
+/* A count of planes, sides apart, up to which images are made. Pairs of planes make images of images,
+ * so that more would cost more than rays: a guess. A room of mirrors has 6, curved ones hundreds. */
 enum { PLANES_MOST = 16 };
 
-/* Corners have float32 coordinates: normals and, over the size of the scene, heights of
- * one plane differ by this. */
+/* 1 - cosine of normals, and heights over the size of the scene, by which triangles of one plane
+ * differ: a guess, some roundings of float32 (1.2e-7), which corners' coordinates have. */
 static const double same_plane = 1e-6;
 
 int ray_mirror_has(const struct mirrors *k, const struct mirror_plane *plane, uint32_t material,
@@ -36,9 +37,10 @@ static int add_plane(const struct model *m, struct mirrors *k, struct array *lis
 {
 	const uint32_t *c = &m->triangle.corner[3 * triangle];
 	const double *x[3];
+	uint32_t material = m->surface.material[m->triangle.surface[triangle]];
 	struct mirror_plane new = { .side = side, .box = { { INFINITY, INFINITY, INFINITY },
 	                                                   { -INFINITY, -INFINITY, -INFINITY } },
-	                            .material = m->surface.material[m->triangle.surface[triangle]] };
+	                            .material = material };
 	struct mirror_plane *have = list->data;
 	size_t i = 0;
 
@@ -68,8 +70,8 @@ int ray_mirrors_find(const struct model *m, struct mirrors *k, struct err *e)
 	*k = (struct mirrors){ .same = same_plane * v3_length(size) };
 	for (size_t t = 0; !bad && t < m->triangle.n && list.n <= PLANES_MOST; t++)
 		for (int side = FRONT; !bad && side <= BACK; side++)
-			if (bsdf_has_ideal(&m->material, m->surface.material[m->triangle.surface[t]],
-			                   side, 0))
+			if (bsdf_has_ideal(&m->material,
+			                   m->surface.material[m->triangle.surface[t]], side, 0))
 				bad = add_plane(m, k, &list, t, side, e);
 	k->plane = list.data;
 	k->complete = list.n <= PLANES_MOST;
@@ -122,7 +124,8 @@ static double turn(const struct model *m, const struct mirrors *k, const struct 
                    uint32_t from, size_t plane, struct image *new)
 {
 	const struct mirror_plane *p = &k->plane[plane];
-	const double *rho = &m->material.rho_s[model_material_at(&m->material, p->material, p->side)];
+	size_t at = model_material_at(&m->material, p->material, p->side);
+	const double *rho = &m->material.rho_s[at];
 	double most = 0;
 
 	*new = all[from];
@@ -163,8 +166,8 @@ static int list_images(const struct model *m, double clear, int orders, size_t m
 		for (size_t i = begin; i < end; i++)
 			for (size_t p = 0; p < g->mirrors.n; p++) {
 				const struct image *all = list->data;
-				if (!turns(&g->mirrors, m->light.kind[all[i].origin] == LIGHT_DIRECTIONAL,
-				           &all[i], p, clear) ||
+				int directional = m->light.kind[all[i].origin] == LIGHT_DIRECTIONAL;
+				if (!turns(&g->mirrors, directional, &all[i], p, clear) ||
 				    turn(m, &g->mirrors, all, (uint32_t)i, p, &new) <= least)
 					continue;
 				if (order >= orders || list->n - m->light.n >= most)
@@ -206,7 +209,8 @@ static void fill(const struct model *m, const struct image *list, struct light_i
 		memcpy(&l->cone[2 * i], &from->cone[2 * o], 2 * sizeof *l->cone);
 		memcpy(&l->cosine[2 * i], &from->cosine[2 * o], 2 * sizeof *l->cosine);
 		for (size_t b = 0; b < bands; b++)
-			l->intensity[i * bands + b] = from->intensity[o * bands + b] * list[i].part[b];
+			l->intensity[i * bands + b] = from->intensity[o * bands + b] *
+			                              list[i].part[b];
 	}
 }
 

@@ -32,18 +32,23 @@ struct ray_scene {
 	int coherent;       /* packets of neighbouring rays pay as packets */
 };
 
-/* Origins leave surfaces by 8 float32 steps at unit scale: rounding of the
+/* A length at unit scale. Origins leave surfaces by 8 float32 steps of 2^-24: rounding of the
  * vertices, of the origin and of the plane together stay below 4. */
 static const double offset_units = 0x1p-21;
 
-/* Up to how many triangles a packet of rays with similar directions is best traced as
- * one; in larger scenes its rays part too soon. A count; measured by a
- * loop of sorted rays: half as fast again with 36 triangles, no faster with 100 000. */
+/* A count of triangles up to which a packet of rays with similar directions is best traced as
+ * one; in larger scenes its rays part too soon. Measured by a loop of sorted rays: half as fast again
+ * with 36 triangles, no faster with 100 000. */
 enum { COHERENT_MOST = 1000 };
 
-/* Up to how many triangles a scene is built by one thread, in hundredths of a second: Embree's
- * others would go on looking for work for longer. A count; a guess. */
+/* A count of triangles up to which a scene is built by one thread, in hundredths of a second:
+ * Embree's others would go on looking for work for longer. A guess. */
 enum { ALONE_MOST = 20000 };
+
+/* How far from the edges of a triangle rays begin: in offsets, and the most as a part of the way to
+ * its centre. Measured: of 1e7 rays in a box one escapes with 4 offsets, none with 16. The most is a
+ * guess that leaves tiny triangles most of their area. */
+static const double inset_offsets = 16, inset_most = .2;
 
 enum { TRIANGLES, SLIVERS };  /* geometries */
 
@@ -149,10 +154,11 @@ static int add_slivers(struct ray_scene *s, const struct model *m, RTCGeometry a
 
 	if (!bad) {
 		rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-		                           rtcGetGeometryBufferData(all, RTC_BUFFER_TYPE_VERTEX, 0), 0,
-		                           3 * sizeof(float), m->vertices);
+		                           rtcGetGeometryBufferData(all, RTC_BUFFER_TYPE_VERTEX, 0),
+		                           0, 3 * sizeof(float), m->vertices);
 		for (size_t k = 0; k < s->slivers; k++)
-			memcpy(&t[3 * k], &m->triangle.corner[3 * (size_t)s->sliver[k]], 3 * sizeof *t);
+			memcpy(&t[3 * k], &m->triangle.corner[3 * (size_t)s->sliver[k]],
+			       3 * sizeof *t);
 		rtcSetGeometryUserData(g, s);
 		rtcSetGeometryIntersectFilterFunction(g, leave_slivers);
 		rtcSetGeometryOccludedFilterFunction(g, leave_slivers);
@@ -175,8 +181,10 @@ static int fill_geometry(struct ray_scene *s, const struct model *m, RTCGeometry
 	for (size_t i = 0; i < m->vertices; i++)
 		to_unit(s, &m->vertex[3 * i], &v[3 * i]);
 	memcpy(t, m->triangle.corner, 3 * m->triangle.n * sizeof *t);
-	for (size_t k = 0; k < s->slivers; k++) /* an edge is never hit */
-		t[3 * (size_t)s->sliver[k] + 1] = t[3 * (size_t)s->sliver[k] + 2] = t[3 * (size_t)s->sliver[k]];
+	for (size_t k = 0; k < s->slivers; k++) { /* a triangle without area is never hit */
+		uint32_t *corner = &t[3 * (size_t)s->sliver[k]];
+		corner[1] = corner[2] = corner[0];
+	}
 	for (size_t i = 0; i < m->triangle.n; i++) {
 		const uint32_t *c = &m->triangle.corner[3 * i];
 		double n[3];
@@ -252,18 +260,18 @@ void ray_leave(const struct ray_scene *s, const double n[3], double x[3])
 
 double ray_inset(const struct ray_scene *s, double area)
 {
-	/* Measured: of 1e7 rays in a box one escapes with 4, none with 16. */
-	return fmin(.2, 16 * ray_offset(s) / sqrt(area));
+	return fmin(inset_most, inset_offsets * ray_offset(s) / sqrt(area));
 }
 
 void ray_point(const struct ray_scene *s, const struct model *m, uint32_t triangle,
                const double weight[3], double x[3])
 {
+	const uint32_t *c = &m->triangle.corner[3 * (size_t)triangle];
 	const double *corner[3];
 	double n[3], w[3], sum = 0;
 
 	for (int i = 0; i < 3; i++)
-		corner[i] = &m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)triangle + (size_t)i]];
+		corner[i] = &m->vertex[3 * (size_t)c[i]];
 	v3_area(corner[0], corner[1], corner[2], n);
 	double least = ray_inset(s, v3_length(n)) / 3;
 	for (int i = 0; i < 3; i++)
@@ -317,8 +325,7 @@ struct ray_units ray_units(const struct ray_scene *s)
 	return (struct ray_units){ { s->centre[0], s->centre[1], s->centre[2] }, s->per_unit };
 }
 
-/* Rays that Embree takes at once: floats of an AVX2 register. */
-enum { PACKET = 8 };
+enum { PACKET = 8 };  /* a count: of floats in a vector of AVX */
 
 /* The parts of a packet that no ray changes, and those that a cast has changed. */
 static void packet_begin(struct RTCRayHit8 *p)

@@ -45,9 +45,8 @@ void ray_point(const struct ray_scene *s, const struct model *m, uint32_t triang
 void ray_nearest(const struct ray_scene *s, const double org[3], const double dir[3],
                  struct ray_hit *hit);
 
-/* Rays by the batch: a count, a whole number of packets; a guess that keeps a batch in the first cache.
- * Origins in the units of the inside: (world - centre) per_unit. */
-enum { RAY_BATCH = 64 };
+/* Rays by the batch. Origins are in the units of the inside: (world - centre) per_unit. */
+enum { RAY_BATCH = 64 };  /* a count, of whole packets of 8: a guess, a batch is 3 kB of the cache */
 
 struct ray_units {
 	double centre[3], per_unit;

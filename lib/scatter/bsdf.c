@@ -7,8 +7,8 @@
 #include "lib/base/vec.h"
 #include "lib/scatter/lobe.h"
 
-/* A direction whose cosine is smaller than rounding of the dot product lies in
- * the surface: it belongs to no side and scatters nothing. */
+/* A cosine: directions that have a smaller one to the normal lie in the surface, as far as the
+ * rounding of a dot product (some 1e-16) tells. They belong to no side and scatter nothing. A guess. */
 static const double in_plane = 1e-14;
 
 /* One way to scatter: coefficients, exponent and chance of being sampled. */
@@ -18,8 +18,7 @@ struct part {
 	double k, chance;
 };
 
-/* Diffuse and lobe, reflected and transmitted. */
-enum { PARTS_MAX = 4 };
+enum { PARTS_MAX = 4 };  /* rho_d, tau_d, rho_s, tau_s */
 
 /* The parts open to a known direction, with chances that sum to 1 (or n = 0). */
 struct parts {
@@ -51,9 +50,9 @@ static void add_part(struct parts *p, enum bsdf_event event, const double *coeff
 		p->part[p->n++] = (struct part){ event, coefficient, k, mean };
 }
 
-static void gather_parts(const struct model *m, size_t material, const double n[3],
-                         const double known[3], enum bsdf_transport transport,
-                         struct parts *p)
+static void list_parts(const struct model *m, size_t material, const double n[3],
+                       const double known[3], enum bsdf_transport transport,
+                       struct parts *p)
 {
 	const struct materials *mt = &m->material;
 	double total = 0;
@@ -66,7 +65,8 @@ static void gather_parts(const struct model *m, size_t material, const double n[
 	 * that is the side across from the known direction. */
 	int side = p->cosine > 0 ? FRONT : BACK;
 	int across = transport == BSDF_FROM_LIGHT ? side : !side;
-	size_t r = model_material_at(mt, material, side), t = model_material_at(mt, material, across);
+	size_t r = model_material_at(mt, material, side);
+	size_t t = model_material_at(mt, material, across);
 	if (!black_side(mt, material, side)) {
 		double k = mt->alpha[2 * material + (size_t)side];
 		add_part(p, BSDF_DIFFUSE_R, &mt->rho_d[r], 0, mt->bands);
@@ -131,8 +131,8 @@ static double evaluate(const struct model *m, const struct parts *p, const doubl
 			continue;
 		if (part->event == BSDF_LOBE_R || part->event == BSDF_LOBE_T) {
 			/* R.w = 2 (n.l)(n.w) - l.w; T.w = -l.w */
-			double power = bsdf_lobe_power(part->k,
-			                               crosses ? -along : 2 * p->cosine * cos_w - along);
+			double cos_gamma = crosses ? -along : 2 * p->cosine * cos_w - along;
+			double power = bsdf_lobe_power(part->k, cos_gamma);
 			if (power == 0)
 				continue;
 			density = lobe_pdf(m->lobe, part->k, power, a);
@@ -152,7 +152,7 @@ void bsdf_eval(const struct model *m, size_t material, const double n[3],
 	struct parts p;
 	double pdf;
 
-	gather_parts(m, material, n, wi, BSDF_FROM_LIGHT, &p);
+	list_parts(m, material, n, wi, BSDF_FROM_LIGHT, &p);
 	evaluate(m, &p, n, wi, wo, BSDF_FROM_LIGHT, f, &pdf);
 }
 
@@ -163,7 +163,7 @@ void bsdf_eval_lobes(const struct model *m, size_t material, const double n[3],
 	double pdf;
 	int lobes = 0;
 
-	gather_parts(m, material, n, wi, BSDF_FROM_LIGHT, &p);
+	list_parts(m, material, n, wi, BSDF_FROM_LIGHT, &p);
 	for (int i = 0; i < p.n; i++)
 		if (p.part[i].event == BSDF_LOBE_R || p.part[i].event == BSDF_LOBE_T)
 			p.part[lobes++] = p.part[i];
@@ -177,7 +177,7 @@ double bsdf_pdf(const struct model *m, size_t material, const double n[3],
 	struct parts p;
 	double pdf;
 
-	gather_parts(m, material, n, known, transport, &p);
+	list_parts(m, material, n, known, transport, &p);
 	evaluate(m, &p, n, known, w, transport, NULL, &pdf);
 	return pdf;
 }
@@ -221,7 +221,7 @@ void bsdf_sample(const struct model *m, size_t material, const double n[3],
 	double f[BANDS_MAX];
 
 	*out = (struct bsdf_sample){ .event = BSDF_ABSORBED };
-	gather_parts(m, material, n, known, transport, &p);
+	list_parts(m, material, n, known, transport, &p);
 	if (p.n == 0)
 		return;
 	const struct part *part = choose(&p, u[0]);

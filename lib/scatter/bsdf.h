@@ -3,7 +3,19 @@
  * All directions are unit vectors that point AWAY from the surface; n is the
  * front normal. Coefficients are those of the side wi lies on: wi is where the
  * light comes from, wo where it goes, whichever of them a caller knows first.
- * The side of a direction w is FRONT where n.w > 0. */
+ * The side of a direction w is FRONT where n.w > 0.
+ *
+ *   f(wi -> wo) = rho_d / pi + rho_s p(wi -> wo)    wo on the side of wi,
+ *                 tau_d / pi + tau_s p(wi -> wo)    wo on the other side;
+ * the lobe p of exponent k (alpha of rho_s, beta of tau_s), gamma the angle of wo to the axis,
+ * R = 2 (n.wi) n - wi of rho_s, T = -wi of tau_s, theta the angles of wi and wo to the normal:
+ *   LOBE_PAPER       p = cos^k gamma / (N_k(theta_i) cos theta_o), its flux per solid angle as in
+ *                    eq. (3) of the paper, scaled to keep all energy (N_k: lobe.h)
+ *   LOBE_RECIPROCAL  p = (k+1) / (2 pi) cos^k gamma / max(cos theta_i, cos theta_o)
+ *                    (Neumann, Neumann & Szirmay-Kalos 1999)
+ * and where k is infinite p is a delta at the axis. With this f, eq. (1) of the paper is
+ *   L(wo) = L_e(wo) + integral over wi of f(wi -> wo) L(wi) cos theta_i dwi,
+ * and eq. (2) its part by rho_d and tau_d. lib/README.md says where we differ from the paper. */
 #ifndef TWOPASS_BSDF_H
 #define TWOPASS_BSDF_H
 

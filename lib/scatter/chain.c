@@ -6,6 +6,9 @@
 #include "lib/base/rng.h"
 #include "lib/scatter/bsdf.h"
 
+/* A count of places, a power of two, which the hash table doubles from: a guess. */
+enum { HASH_AT_FIRST = 64 };
+
 static int rehash(struct chains *c, size_t size, struct err *e);
 
 static int changes_no_colour(const struct materials *mt, uint32_t id)
@@ -50,7 +53,7 @@ int bsdf_chains_init(struct chains *c, const struct model *m, uint32_t most, str
 	uint32_t *none = mem_new(c->events, sizeof *none, "chains", e);
 	/* Rows of no events must have an address too. */
 	int bad = !none || mem_reserve(&c->count, 1, sizeof *none, e) ||
-	          mem_reserve(&c->child, 1, sizeof *none, e) || rehash(c, 64, e) ||
+	          mem_reserve(&c->child, 1, sizeof *none, e) || rehash(c, HASH_AT_FIRST, e) ||
 	          bsdf_chains_find(c, none, e) == CHAIN_NONE;
 	free(none);
 	return bad ? -1 : 0;

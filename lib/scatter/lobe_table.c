@@ -4,23 +4,29 @@
 
 #include "lib/scatter/lobe.h"
 
-/* Wider lobes have a normaliser that is not smooth at cosine 1.
- * An exponent; tests/unit/test_lobe.c holds the table to 1e-5 from here on. */
+/* An exponent: lobes of smaller ones have a normaliser that is not smooth at cosine 1, where it
+ * differs from N_k(0) as sin^(k+1), and are not interpolated. A guess, which unit test lobe checks
+ * with LOBE_TABLE. */
 static const double sharp_from = 5;
+
+/* The sine, times sqrt(k + 1), of the angle where cos^k has fallen to e^-18 = 2e-8: what the horizon
+ * cuts off beyond it does not count. */
+static const double reach = 6;
 
 void bsdf_lobe_table_make(struct lobe_table *t, double k)
 {
 	t->k = k;
 	t->whole = bsdf_lobe_normaliser(k, 1);
 	/* The horizon cuts off cos^k of more than the angle whose sine is `end`. */
-	t->end = fmin(1, 6 / sqrt(k + 1));
+	t->end = fmin(1, reach / sqrt(k + 1));
 	t->per_step = LOBE_TABLE / t->end;
 	if (k < sharp_from)
 		return;
 	for (int i = 0; i <= LOBE_TABLE + 2; i++) {
 		double c = (i - 1) / t->per_step;
 		/* What a lobe below the horizon loses, one above it has. */
-		t->value[i] = c < 0 ? t->whole - bsdf_lobe_normaliser(k, -c) : bsdf_lobe_normaliser(k, fmin(1, c));
+		t->value[i] = c < 0 ? t->whole - bsdf_lobe_normaliser(k, -c)
+		                    : bsdf_lobe_normaliser(k, fmin(1, c));
 	}
 }
 
