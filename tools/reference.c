@@ -46,7 +46,7 @@ static const struct option_spec option_table[] = {
 	{ 'o', "output", "FILE", "picture (EXR) or table (CSV) to write; - for standard output",
 	  TEXT(output), .role = OPTION_ASIDE },
 	{ 's', "size", "WxH", "pixels (default: 640 wide, height from the camera's aspect)",
-	  PIXELS(size), .role = OPTION_RECORDED },
+	  RESOLUTION(size), .role = OPTION_RECORDED },
 	{ 0, "irradiance", NULL, "irradiance of all element-sides by particles", FLAG(irradiance) },
 	{ 0, "samples", "N", "paths in each pixel (default: 64), or particles (1000000)",
 	  INTEGER(o.samples, 1, 1000000000000) },

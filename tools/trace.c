@@ -73,7 +73,7 @@ static const struct option_spec option_table[] = {
 	{ 'o', "output", "FILE", "picture to write (EXR); %s stands for the camera's name",
 	  TEXT(output), .role = OPTION_ASIDE },
 	{ 's', "size", "WxH", "pixels (default: 640 wide, height from the camera's aspect)",
-	  PIXELS(size), .role = OPTION_RECORDED },
+	  RESOLUTION(size), .role = OPTION_RECORDED },
 	{ 0, "eye", "X,Y,Z", "render a view from this point", VECTOR(eye), .role = OPTION_RECORDED },
 	{ 0, "target", "X,Y,Z", "point it looks at", VECTOR(target), .role = OPTION_RECORDED },
 	{ 0, "up", "X,Y,Z", "its upright direction (default: %s)", VECTOR(up),

@@ -62,7 +62,7 @@ struct option_spec {
 #define LIST(member) .type = OPTION_LIST, OPTION_AT(member)
 #define JOINED(member) .type = OPTION_JOINED, OPTION_AT(member)
 #define LENGTH(member) .type = OPTION_LENGTH, OPTION_AT(member), .max = INFINITY
-#define PIXELS(member) .type = OPTION_PIXELS, OPTION_AT(member)
+#define RESOLUTION(member) .type = OPTION_PIXELS, OPTION_AT(member)
 #define VECTOR(member) .type = OPTION_VECTOR, OPTION_AT(member)
 #define RATIO(member) .type = OPTION_RATIO, OPTION_AT(member)
 

@@ -36,7 +36,7 @@ static const struct option_spec table[] = {
 	{ 0, "method", "HOW", "rays or %s (default)", WORD(method, methods) },
 	{ 0, "layers", "LIST", "Z, N, patch", SET(layers, layers) },
 	{ 0, "part", "K/N", "shard", RATIO(part) },
-	{ 0, "pixels", "WxH", "size", PIXELS(pixels) },
+	{ 0, "pixels", "WxH", "size", RESOLUTION(pixels) },
 	{ 0, "at", "X,Y,Z", "place", VECTOR(at) },
 	{ 0, "size", "SIZE", "length (default %s)", LENGTH(size) },
 	{ 0, "camera", "NAME", "view", LIST(camera), .role = OPTION_RECORDED },
