@@ -48,6 +48,24 @@ void *mem_new(size_t n, size_t size, const char *what, struct err *e)
 	return p;
 }
 
+int mem_new_arrays(const struct mem_array *a, size_t n, const char *what, struct err *e)
+{
+	int bad = 0;
+
+	for (size_t i = 0; i < n; i++) {
+		void *p = mem_new(a[i].n, a[i].size, what, e);
+		memcpy(a[i].slot, &p, sizeof p);
+		bad |= !p;
+	}
+	return bad ? -1 : 0;
+}
+
+void mem_free_arrays(void *const *array, size_t n)
+{
+	for (size_t i = 0; i < n; i++)
+		free(array[i]);
+}
+
 int mem_reserve(struct array *a, size_t more, size_t size, struct err *e)
 {
 	if (more <= a->capacity - a->n)

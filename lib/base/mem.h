@@ -16,6 +16,22 @@ void mem_keep(void);
  * overflows or memory is short. */
 void *mem_new(size_t n, size_t size, const char *what, struct err *e);
 
+/* An array of a struct, to be allocated with the others: the address of the pointer to it, how many
+ * elements it has, and how many bytes each. MEM_ARRAY: `width` values an element. */
+struct mem_array {
+	void *slot;
+	size_t n, size;
+};
+#define MEM_ARRAY(pointer, n, width) { &(pointer), n, (width) * sizeof *(pointer) }
+
+/* Allocates n arrays, zeroed, as mem_new does. 0, or -1 and e: then some are NULL. */
+int mem_new_arrays(const struct mem_array *a, size_t n, const char *what, struct err *e);
+
+/* Frees all of these pointers. */
+#define MEM_FREE(...) \
+	mem_free_arrays((void *[]){ __VA_ARGS__ }, sizeof((void *[]){ __VA_ARGS__ }) / sizeof(void *))
+void mem_free_arrays(void *const *array, size_t n);
+
 /* A growable array. Begin with {0}; release with free(a.data). */
 struct array {
 	void *data;

@@ -52,23 +52,23 @@ int model_derive(struct model *m, struct err *e)
 
 int model_materials_new(struct materials *mt, size_t n, int bands, struct err *e)
 {
-	size_t nb = 2 * n * (size_t)bands;
-	double **banded[] = { &mt->rho_d, &mt->tau_d, &mt->rho_s, &mt->tau_s, &mt->emission };
-	double **plain[] = { &mt->alpha, &mt->beta, &mt->emission_exponent };
+	const size_t b = (size_t)bands;
 
 	*mt = (struct materials){ .n = n, .bands = bands };
-	for (size_t i = 0; i < sizeof banded / sizeof *banded; i++)
-		if (!(*banded[i] = mem_new(nb, sizeof(double), "materials", e)))
-			return -1;
-	for (size_t i = 0; i < sizeof plain / sizeof *plain; i++) {
-		if (!(*plain[i] = mem_new(2 * n, sizeof(double), "materials", e)))
-			return -1;
-		for (size_t k = 0; k < 2 * n; k++)
-			(*plain[i])[k] = i < 2 ? (double)INFINITY : 1;
+	const struct mem_array array[] = {
+		MEM_ARRAY(mt->name, n, 1), MEM_ARRAY(mt->one_sided, n, 1),
+		MEM_ARRAY(mt->rho_d, 2 * n, b), MEM_ARRAY(mt->tau_d, 2 * n, b),
+		MEM_ARRAY(mt->rho_s, 2 * n, b), MEM_ARRAY(mt->tau_s, 2 * n, b),
+		MEM_ARRAY(mt->emission, 2 * n, b), MEM_ARRAY(mt->alpha, 2 * n, 1),
+		MEM_ARRAY(mt->beta, 2 * n, 1), MEM_ARRAY(mt->emission_exponent, 2 * n, 1)
+	};
+	if (mem_new_arrays(array, sizeof array / sizeof *array, "materials", e))
+		return -1;
+	for (size_t i = 0; i < 2 * n; i++) {
+		mt->alpha[i] = mt->beta[i] = (double)INFINITY;
+		mt->emission_exponent[i] = 1;
 	}
-	mt->name = mem_new(n, sizeof *mt->name, "material names", e);
-	mt->one_sided = mem_new(n, 1, "materials", e);
-	return mt->name && mt->one_sided ? 0 : -1;
+	return 0;
 }
 
 static void free_names(char **name, size_t n)
@@ -81,41 +81,26 @@ static void free_names(char **name, size_t n)
 void model_materials_free(struct materials *mt)
 {
 	free_names(mt->name, mt->n);
-	free(mt->rho_d);
-	free(mt->tau_d);
-	free(mt->rho_s);
-	free(mt->tau_s);
-	free(mt->alpha);
-	free(mt->beta);
-	free(mt->emission);
-	free(mt->emission_exponent);
-	free(mt->one_sided);
+	MEM_FREE(mt->rho_d, mt->tau_d, mt->rho_s, mt->tau_s, mt->alpha, mt->beta, mt->emission,
+	         mt->emission_exponent, mt->one_sided);
 	*mt = (struct materials){ 0 };
 }
 
 int model_lights_new(struct lights *l, size_t n, int bands, struct err *e)
 {
 	*l = (struct lights){ .n = n };
-	l->name = mem_new(n, sizeof *l->name, "light names", e);
-	l->kind = mem_new(n, 1, "lights", e);
-	l->position = mem_new(n, 3 * sizeof *l->position, "lights", e);
-	l->direction = mem_new(n, 3 * sizeof *l->direction, "lights", e);
-	l->cone = mem_new(n, 2 * sizeof *l->cone, "lights", e);
-	l->intensity = mem_new(n, (size_t)bands * sizeof *l->intensity, "lights", e);
-	return l->name && l->kind && l->position && l->direction && l->cone && l->intensity
-	           ? 0 : -1;
+	const struct mem_array array[] = {
+		MEM_ARRAY(l->name, n, 1), MEM_ARRAY(l->kind, n, 1), MEM_ARRAY(l->position, n, 3),
+		MEM_ARRAY(l->direction, n, 3), MEM_ARRAY(l->cone, n, 2),
+		MEM_ARRAY(l->intensity, n, (size_t)bands)
+	};
+	return mem_new_arrays(array, sizeof array / sizeof *array, "lights", e);
 }
 
 void model_lights_free(struct lights *l)
 {
 	free_names(l->name, l->n);
-	free(l->kind);
-	free(l->position);
-	free(l->direction);
-	free(l->cone);
-	free(l->intensity);
-	free(l->unit_flux);
-	free(l->cosine);
+	MEM_FREE(l->kind, l->position, l->direction, l->cone, l->intensity, l->unit_flux, l->cosine);
 	*l = (struct lights){ 0 };
 }
 
@@ -124,18 +109,14 @@ void model_free(struct model *m)
 	model_materials_free(&m->material);
 	model_lights_free(&m->light);
 	free_names(m->surface.name, m->surface.n);
-	free(m->surface.material);
-	free(m->surface.has_normals);
 	for (size_t i = 0; m->camera && i < m->cameras; i++)
 		free(m->camera[i].name);
-	free(m->camera);
-	void *array[] = { m->vertex, m->triangle.corner, m->triangle.surface, m->triangle.uv,
-		m->triangle.normal, m->triangle.split, m->split, m->element.corner,
-		m->element.triangle, m->element.area, m->element.normal, m->element.patch,
-		m->patch.start, m->patch.surface, m->patch.area, m->patch.loop,
-		m->patch.loop_start, m->patch.loop_index };
-	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
-		free(array[i]);
+	MEM_FREE(m->surface.material, m->surface.has_normals, m->camera, m->vertex,
+	         m->triangle.corner, m->triangle.surface, m->triangle.uv, m->triangle.normal,
+	         m->triangle.split, m->split, m->element.corner, m->element.triangle,
+	         m->element.area, m->element.normal, m->element.patch, m->patch.start,
+	         m->patch.surface, m->patch.area, m->patch.loop, m->patch.loop_start,
+	         m->patch.loop_index);
 	*m = (struct model){ 0 };
 }
 

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "lib/base/mem.h"
 #include "lib/base/channels.h"
 
 double solution_exitance(const struct model *m, const struct solution *s,
@@ -118,16 +119,11 @@ double solution_relative_rms(const struct model *m, const struct solution *s,
 
 void solution_free(struct solution *s)
 {
-	double *array[] = { s->irradiance.direct, s->irradiance.caustic, s->irradiance.indirect,
-		s->error.sampling, s->error.sampling_direct,
-		s->error.discretisation, s->error.discretisation_direct,
-		s->unshot.emission, s->unshot.diffuse, s->unshot.link, s->shot, s->ledger };
-
-	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
-		free(array[i]);
 	for (size_t g = 0; s->group_name && g < s->groups; g++)
 		free(s->group_name[g]);
-	free(s->group_name);
-	free(s->emitter_group);
+	MEM_FREE(s->group_name, s->emitter_group, s->irradiance.direct, s->irradiance.caustic,
+	         s->irradiance.indirect, s->error.sampling, s->error.sampling_direct,
+	         s->error.discretisation, s->error.discretisation_direct, s->unshot.emission,
+	         s->unshot.diffuse, s->unshot.link, s->shot, s->ledger);
 	*s = (struct solution){ 0 };
 }

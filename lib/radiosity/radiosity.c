@@ -22,22 +22,21 @@ static int solution_arrays(struct solution *s, const struct model *m,
 	s->sources = model_sources(m);
 	s->links = t->links;
 	s->rows = t->rows;
-	s->irradiance.direct = mem_new(sides, bands * sizeof(double), "irradiance", e);
-	s->irradiance.caustic = mem_new(sides, bands * sizeof(double), "irradiance", e);
-	s->irradiance.indirect = mem_new(sides, bands * sizeof(double), "irradiance", e);
-	s->error.sampling = mem_new(es, bands * sizeof(double), "irradiance", e);
-	s->error.sampling_direct = mem_new(es, bands * sizeof(double), "irradiance", e);
-	s->error.discretisation = mem_new(es, bands * sizeof(double), "irradiance", e);
-	s->error.discretisation_direct = mem_new(es, bands * sizeof(double), "irradiance", e);
-	s->unshot.emission = mem_new(s->sources, bands * sizeof(double), "unshot flux", e);
-	s->unshot.diffuse = mem_new(ps, channels * sizeof(double), "unshot flux", e);
-	s->unshot.link = mem_new(t->links, 2 * channels * sizeof(double), "unshot flux", e);
-	s->shot = mem_new(t->rows, 2 * channels * sizeof(double), "shot flux", e);
-	s->ledger = mem_new(LEDGER_TERMS, channels * sizeof(double), "ledger", e);
-	return s->irradiance.direct && s->irradiance.caustic && s->irradiance.indirect &&
-	       s->error.sampling && s->error.sampling_direct && s->error.discretisation &&
-	       s->error.discretisation_direct && s->unshot.emission && s->unshot.diffuse &&
-	       s->unshot.link && s->shot && s->ledger ? 0 : -1;
+	const struct mem_array array[] = {
+		MEM_ARRAY(s->irradiance.direct, sides, bands),
+		MEM_ARRAY(s->irradiance.caustic, sides, bands),
+		MEM_ARRAY(s->irradiance.indirect, sides, bands),
+		MEM_ARRAY(s->error.sampling, es, bands),
+		MEM_ARRAY(s->error.sampling_direct, es, bands),
+		MEM_ARRAY(s->error.discretisation, es, bands),
+		MEM_ARRAY(s->error.discretisation_direct, es, bands),
+		MEM_ARRAY(s->unshot.emission, s->sources, bands),
+		MEM_ARRAY(s->unshot.diffuse, ps, channels),
+		MEM_ARRAY(s->unshot.link, t->links, 2 * channels),
+		MEM_ARRAY(s->shot, t->rows, 2 * channels),
+		MEM_ARRAY(s->ledger, LEDGER_TERMS, channels)
+	};
+	return mem_new_arrays(array, sizeof array / sizeof *array, "solution", e);
 }
 
 /* Flux, in the scene's unit: what is larger cannot be squared for variances (DBL_MAX is
