@@ -8,8 +8,9 @@
 #include "lib/base/vec.h"
 #include "lib/scatter/bsdf.h"
 
-/* A count of planes, sides apart, up to which images are made. Pairs of planes make images of images,
- * so that more would cost more than rays: a guess. A room of mirrors has 6, curved ones hundreds. */
+/* A count of planes, sides apart, up to which images are made. Pairs of planes make images of
+ * images, so that more would cost more than rays: a guess. A room of mirrors has 6, curved ones
+ * have hundreds. */
 enum { PLANES_MOST = 16 };
 
 /* 1 - cosine of normals, and heights over the size of the scene, by which triangles of one plane

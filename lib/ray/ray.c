@@ -45,8 +45,8 @@ enum { COHERENT_MOST = 1000 };
  * Embree's others would go on looking for work for longer. A guess. */
 enum { ALONE_MOST = 20000 };
 
-/* How far from the edges of a triangle rays begin: in offsets, and the most as a part of the way to
- * its centre. Measured: of 1e7 rays in a box one escapes with 4 offsets, none with 16. The most is a
+/* How far from the edges of a triangle rays begin: in offsets, and the most as a part of the way
+ * to its centre. Measured: of 1e7 rays in a box one escapes with 4 offsets, none with 16. The most is a
  * guess that leaves tiny triangles most of their area. */
 static const double inset_offsets = 16, inset_most = .2;
 

@@ -46,7 +46,7 @@ void ray_nearest(const struct ray_scene *s, const double org[3], const double di
                  struct ray_hit *hit);
 
 /* Rays by the batch. Origins are in the units of the inside: (world - centre) per_unit. */
-enum { RAY_BATCH = 64 };  /* a count, of whole packets of 8: a guess, a batch is 3 kB of the cache */
+enum { RAY_BATCH = 64 };  /* a count, of whole packets of 8: a guess, 2 kB of the cache */
 
 struct ray_units {
 	double centre[3], per_unit;

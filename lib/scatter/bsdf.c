@@ -8,7 +8,8 @@
 #include "lib/scatter/lobe.h"
 
 /* A cosine: directions that have a smaller one to the normal lie in the surface, as far as the
- * rounding of a dot product (some 1e-16) tells. They belong to no side and scatter nothing. A guess. */
+ * rounding of a dot product (some 1e-16) tells: they belong to no side and scatter nothing.
+ * A guess. */
 static const double in_plane = 1e-14;
 
 /* One way to scatter: coefficients, exponent and chance of being sampled. */

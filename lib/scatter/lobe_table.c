@@ -9,8 +9,8 @@
  * with LOBE_TABLE. */
 static const double sharp_from = 5;
 
-/* The sine, times sqrt(k + 1), of the angle where cos^k has fallen to e^-18 = 2e-8: what the horizon
- * cuts off beyond it does not count. */
+/* The sine, times sqrt(k + 1), of the angle where cos^k has fallen to e^-18 = 2e-8: what the
+ * horizon cuts off beyond it does not count. */
 static const double reach = 6;
 
 void bsdf_lobe_table_make(struct lobe_table *t, double k)
