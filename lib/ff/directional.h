@@ -1,4 +1,6 @@
-/* Directional form factors (private to lib/ff). */
+/* Directional form factors (private to lib/ff): eq. (3) of the paper, for light that came to patch i
+ * from one source, with a the angle to the lobe's axis (R or T) and theta that to the normal,
+ *     G'(i->e) = cos^k a / cos theta F(i->e),    G(i->e) = G'(i->e) / sum of G' over all it sees. */
 #ifndef TWOPASS_DIRECTIONAL_H
 #define TWOPASS_DIRECTIONAL_H
 

@@ -4,7 +4,7 @@
 
 #include "lib/ff_rays/ff_internal.h"
 
-/* A row of direct sight: t->sights becomes F[source -> element-side] of every
+/* A row of direct sight: t->shares becomes F[source -> element-side] of every
  * element-side that may see the source, with about `rays` rays between them. Returns
  * their sum. O(elements + rays). */
 double ff_emitter_row(struct ff_thread *t, uint32_t source, uint32_t rays, struct err *e);

@@ -6,7 +6,7 @@
 #include "lib/ff_rays/ff_internal.h"
 
 /* Casts ff_reciprocal_rays rays from every element-side that is modelled and no ideal mirror or
- * pane, jointly stratified over its area and hemisphere, into j->gather; adds to *rays.
+ * pane, jointly stratified over its area and hemisphere, into j->reciprocal; adds to *rays.
  * Memory: 16 bytes for every pair of an element-side and a patch-side that it sees.
  * O(element-sides x rays x log triangles). 0, or -1 and e. */
 int ff_reciprocal_cast(struct ff_job *j, double *rays, const struct progress *progress,

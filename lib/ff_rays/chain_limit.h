@@ -1,4 +1,4 @@
-/* How far chains of ideal events are told apart (private to lib/ff). */
+/* How far chains of ideal events are told apart (for lib/ff). */
 #ifndef TWOPASS_CHAIN_LIMIT_H
 #define TWOPASS_CHAIN_LIMIT_H
 

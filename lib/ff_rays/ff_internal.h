@@ -1,5 +1,5 @@
 /* What the methods of form-factor computation share: the state of a job and of its threads
- * (private to lib/ff). */
+ * (for lib/ff). */
 #ifndef TWOPASS_FF_INTERNAL_H
 #define TWOPASS_FF_INTERNAL_H
 

@@ -1,4 +1,4 @@
-/* How many rays rows and elements cast (private to lib/ff). */
+/* How many rays rows and elements cast (for lib/ff). */
 #ifndef TWOPASS_RAY_BUDGET_H
 #define TWOPASS_RAY_BUDGET_H
 

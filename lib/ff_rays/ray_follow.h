@@ -1,4 +1,4 @@
-/* Rays of a row, followed wherever ideal surfaces and lobes send them (private to lib/ff). */
+/* Rays of a row, followed wherever ideal surfaces and lobes send them (for lib/ff). */
 #ifndef TWOPASS_RAY_FOLLOW_H
 #define TWOPASS_RAY_FOLLOW_H
 

@@ -1,4 +1,4 @@
-/* Where rays begin, go and land (private to lib/ff). */
+/* Where rays begin, go and land (for lib/ff). */
 #ifndef TWOPASS_RAY_SAMPLES_H
 #define TWOPASS_RAY_SAMPLES_H
 

@@ -1,4 +1,4 @@
-/* Factors from plane patch-sides to element-sides by formula (private to lib/ff). */
+/* Factors from plane patch-sides to element-sides by formula (for lib/ff). */
 #ifndef TWOPASS_ROW_FORMULA_H
 #define TWOPASS_ROW_FORMULA_H
 

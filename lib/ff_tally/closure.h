@@ -1,4 +1,4 @@
-/* Closed rows made to add up, by least squares (private to lib/ff). */
+/* Closed rows made to add up, by least squares (for lib/ff). */
 #ifndef TWOPASS_CLOSURE_H
 #define TWOPASS_CLOSURE_H
 

@@ -1,5 +1,5 @@
 /* Batches of rows: put together, chain numbers and links made those of the whole
- * (private to lib/ff). */
+ * (for lib/ff). */
 #ifndef TWOPASS_FF_BATCH_H
 #define TWOPASS_FF_BATCH_H
 

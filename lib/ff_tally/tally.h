@@ -43,7 +43,7 @@ struct tally {
 	int dependent;             /* samples of a replicate are no independent ones */
 
 	struct tally_chains far;      /* longer chains */
-	struct array rest;         /* struct ff_tally_rest by slot */
+	struct array rest;         /* struct tally_rest by slot */
 	struct tally_rest spill;   /* takes what comes after running out of memory */
 	struct array slot_chain;   /* uint32_t chain by slot; slot 0 = chain 0 */
 	struct array chain_slot;   /* uint32_t 1 + slot by chain, 0 = unused */

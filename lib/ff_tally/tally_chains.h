@@ -1,5 +1,5 @@
 /* Landings by chains longer than 0, sparse: kept as a list and added up now and then
- * (private to lib/ff). */
+ * (for lib/ff). */
 #ifndef TWOPASS_TALLY_CHAINS_H
 #define TWOPASS_TALLY_CHAINS_H
 

@@ -20,7 +20,7 @@ struct builder {
 	size_t vertices;       /* emitted so far */
 };
 
-static void occ_exchange(uint32_t *a, uint32_t *b)
+static void swap(uint32_t *a, uint32_t *b)
 {
 	uint32_t t = *a;
 
@@ -53,7 +53,7 @@ static void select_nth(struct builder *b, int axis, size_t begin, size_t end, si
 				j--;
 			if (i >= j)
 				break;
-			occ_exchange(&o[i], &o[j]);
+			swap(&o[i], &o[j]);
 		}
 		/* [begin, i) < pivot <= [i, end), and i == j means o[i] is the pivot. */
 		if (k < i)
