@@ -329,7 +329,8 @@ static int render_within(const struct trace *t, const struct shot *s,
 	/* Doublings of the first picture at most, which has 4096 samples a pixel then. And it has an
 	 * eighth of the usual rays, so that it takes little of the budget; a tenth of what is left is
 	 * kept for what a picture takes longer than the last one foretells. Guesses. */
-	enum { MOST = 12 };
+	enum { MOST = 12, FIRST_RAYS = 8 };
+	const double spent = .9;
 	struct view_options o = t->view;
 	double begun = cli_seconds(), last = begun;
 	int level = 0, bad;
@@ -338,10 +339,10 @@ static int render_within(const struct trace *t, const struct shot *s,
 		picture_image_free(im);
 		*im = (struct image){ 0 };
 		o.samples = 1 << level;
-		o.gather_rays = t->view.gather_rays / 8 << level;
+		o.gather_rays = t->view.gather_rays / FIRST_RAYS << level;
 		bad = view_render(t->scene, &s->frame, &o, progress, im, v, e);
 		double now = cli_seconds(), left = t->budget - (now - begun);
-		double more = now > last ? .9 * left / (now - last) : 0;
+		double more = now > last ? spent * left / (now - last) : 0;
 		if (bad || more < 2 || level == MOST)
 			return bad;
 		level = (int)fmin(MOST, level + floor(log2(more)));

@@ -86,7 +86,7 @@ static double diagonal(const struct lights *l)
 }
 
 void model_light_see(const struct lights *l, size_t light, const double x[3], double clear,
-                     struct light_sight *s)
+                     struct light_sample *s)
 {
 	const double *direction = &l->direction[3 * light];
 

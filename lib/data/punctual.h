@@ -12,7 +12,7 @@
 #include "lib/data/model.h"
 
 /* A light as a point sees it. */
-struct light_sight {
+struct light_sample {
 	double toward[3];    /* unit vector to the light */
 	double to[3];        /* a shadow ray's end: just before the light, or beyond the scene */
 	double across;       /* irradiance across the rays on the axis, of intensity 1 */
@@ -29,7 +29,7 @@ int model_lights_derive(struct model *m, struct err *e);
  * the extension's ((cos - cos outer) / (cos inner - cos outer))^2; `clear` is how far before
  * the light a ray ends (ray_offset). */
 void model_light_see(const struct lights *l, size_t light, const double x[3], double clear,
-                     struct light_sight *s);
+                     struct light_sample *s);
 
 /* A ray of the light from three numbers in [0,1): all carry the same flux. */
 void model_light_ray(const struct lights *l, size_t light, const double u[3], double clear,

@@ -35,7 +35,7 @@ enum {
 	EMITTER_LANDINGS = 16, FEW_LOBES = 256, /* see cluster_rays */
 	CLUSTER_SHARE = 128,  /* sources are joined up to one CLUSTER_SHARE-th of the rays */
 	PROBES = 4,           /* point pairs tried for emitters that no ray met */
-	BIN_RINGS = 3, BIN_SECTORS = 8
+	BIN_RINGS = 3, BIN_SECTORS = 8, BIN_SAMPLES = 16
 };
 
 struct order {
@@ -190,7 +190,7 @@ static int bin_captures(struct ff_thread *t, uint32_t ps, struct err *e)
 	const struct ff_job *j = t->job;
 	uint64_t seed = rng_mix(j->o.seed ^ ~(uint64_t)ps);
 
-	for (uint32_t i = 0; i < BIN_RINGS * BIN_SECTORS * 16; i++) {
+	for (uint32_t i = 0; i < BIN_RINGS * BIN_SECTORS * BIN_SAMPLES; i++) {
 		struct ff_incident c = { .source = FF_ANY, .w = 1, .view = i % j->o.points };
 		double n[3], u[2] = { rng_sobol(i, 2, seed), rng_sobol(i, 3, seed) };
 		c.element = ff_point(j, ps >> 1, rng_sobol(i, 0, seed), rng_sobol(i, 1, seed), c.x);

@@ -31,7 +31,7 @@ struct matrix {
 	double *area;                 /* [n] */
 	int curved;                   /* some side is: it has no facets, its pairs are by rays */
 	struct facet_set facets;
-	struct occluder_set bodies;
+	struct occluder_set occluders;
 	struct cubature_pair_table table;     /* empty unless side i is facet i, and nothing ever between */
 	double centre[3];
 	struct thread *thread;
@@ -354,11 +354,11 @@ static int find_sides(struct matrix *m, struct err *e)
 static int tabulate(struct matrix *m, double relative, struct err *e)
 {
 	const uint32_t *start = m->facets.start;
-	int simple = !m->bodies.nodes && m->facets.facets == m->n;
+	int simple = !m->occluders.nodes && m->facets.facets == m->n;
 
 	for (size_t i = 0; simple && i < m->n; i++)
 		simple = start[m->side[i]] == i && start[m->side[i] + 1] == i + 1;
-	return simple ? geo_pair_table_new(m->facets.facet, m->facets.pair, m->n, relative, m->bodies.near,
+	return simple ? geo_pair_table_new(m->facets.facet, m->facets.pair, m->n, relative, m->occluders.near,
 	                                   &m->table, e) : 0;
 }
 
@@ -380,7 +380,7 @@ static int matrix_init(struct matrix *m, const struct ff_job *j, struct err *e)
 
 	*m = (struct matrix){ .job = j };
 	if (find_sides(m, e) || occ_facet_set_init(&m->facets, j->m, FACETS_OF_PATCHES, e) ||
-	    occ_occluder_set_init(&m->bodies, j->m, e) || tabulate(m, o.relative, e))
+	    occ_occluder_set_init(&m->occluders, j->m, e) || tabulate(m, o.relative, e))
 		return -1;
 	occ_facet_centre(j->m, m->centre);
 	for (size_t i = 0; i < m->n; i++)
@@ -389,7 +389,7 @@ static int matrix_init(struct matrix *m, const struct ff_job *j, struct err *e)
 	if (!m->thread)
 		return -1;
 	for (int t = 0; t < j->o.threads; t++) {
-		occ_exchanger_init(&m->thread[t].x, &o, &m->bodies, j->rays, m->centre);
+		occ_exchanger_init(&m->thread[t].x, &o, &m->occluders, j->rays, m->centre);
 		if (ff_remainder_init(&m->thread[t].rest, j, e))
 			return -1;
 	}
@@ -412,7 +412,7 @@ static void matrix_free(struct matrix *m)
 	free(m->doubt.data);
 	geo_pair_table_free(&m->table);
 	occ_facet_set_free(&m->facets);
-	occ_occluder_set_free(&m->bodies);
+	occ_occluder_set_free(&m->occluders);
 }
 
 int ff_exchange_matrix(const struct ff_job *j, uint32_t begin, uint32_t end, const struct ff_sink *sink,

@@ -140,7 +140,7 @@ int ff_thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e)
 		t->formula = mem_new(1, sizeof *t->formula, "formulas", e);
 		if (!t->formula)
 			return -1;
-		occ_exchanger_init(t->formula, &o, &j->formula.bodies, j->rays, j->formula.centre);
+		occ_exchanger_init(t->formula, &o, &j->formula.occluders, j->rays, j->formula.centre);
 	}
 	if (j->o.method != FF_HEMICUBE)
 		return 0;
@@ -160,7 +160,7 @@ void ff_thread_free(struct ff_thread *t)
 	free(t->incident.data);
 	free(t->pairs.data);
 	free(t->shares.data);
-	free(t->lit.data);
+	free(t->arrivals.data);
 	free(t->item);
 	free(t->view);
 	free(t->chain_map.data);

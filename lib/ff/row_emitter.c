@@ -33,6 +33,17 @@ static const double faint = .25;
  * Rays, and a form factor; guesses. */
 static const double worth = 1, much = 1e-5;
 
+/* How near centres are taken to be, at least, for what an element may get: a fraction of the squared
+ * sizes of both; and what of a full cosine each pair has at least, as centres say little of what
+ * is askew. Guesses. */
+static const double nearest = .25, askew = .02;
+
+/* Closer than so many squared sizes of both, rays of the element meet the source. A guess. */
+static const double close = 2;
+
+/* Sine of what is in a plane, but for rounding. */
+static const double in_plane = 1e-9;
+
 /* The form factor per area between two points. */
 static double kernel(const double x[3], const double nx[3], const double y[3],
                      const double ny[3])
@@ -76,10 +87,10 @@ static struct outlook look(const struct ff_job *j, uint32_t source, uint32_t col
 	double r2 = v3_dot(d, d), cx = v3_dot(d, nx), cy = -v3_dot(d, ny);
 	if (cx < -c[3])
 		return (struct outlook){ 0 };
-	double s2 = fmax(r2, .25 * size * size);
-	double f = fmax(fmax(0, cx) * fmax(0, cy) / s2, .02) / (PI * s2);
+	double s2 = fmax(r2, nearest * size * size);
+	double f = fmax(fmax(0, cx) * fmax(0, cy) / s2, askew) / (PI * s2);
 	return (struct outlook){ rays * area * f, j->m->patch.area[source >> 1] * f,
-	                         r2 < 2 * size * size };
+	                         r2 < close * size * size };
 }
 
 static int above(const struct model *m, uint32_t first, uint32_t end, const double x[3],
@@ -88,7 +99,7 @@ static int above(const struct model *m, uint32_t first, uint32_t end, const doub
 	for (size_t i = 3 * (size_t)first; i < 3 * (size_t)end; i++) {
 		double d[3];
 		v3_sub(&m->vertex[3 * (size_t)m->element.corner[i]], x, d);
-		if (v3_dot(d, n) > 1e-9 * v3_length(d))
+		if (v3_dot(d, n) > in_plane * v3_length(d))
 			return 1;
 	}
 	return 0;

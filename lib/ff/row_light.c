@@ -28,7 +28,7 @@ enum {
 };
 
 /* What arrives at an element-side by one chain. */
-struct lit {
+struct light_arrival {
 	uint32_t column, chain;
 	double value;           /* first summed weights; then the fraction of the light's flux */
 	double variance;        /* 0: exact */
@@ -48,7 +48,7 @@ struct look {
 	uint32_t none;          /* see nothing */
 	double all, seen;       /* summed weights of points: if all saw all, and so */
 	double squares[3];      /* summed all^2, all seen, seen^2 */
-	size_t first;           /* of its chains in t->lit */
+	size_t first;           /* of its chains in t->arrivals */
 };
 
 /* ---- an element looks at the light ---- */
@@ -56,22 +56,22 @@ struct look {
 static void see_by(struct ff_thread *t, struct look *k, uint32_t chain, double w,
                    const double toward[3])
 {
-	struct lit *lit = t->lit.data, new = { .column = k->column, .chain = chain };
+	struct light_arrival *arrival = t->arrivals.data, new = { .column = k->column, .chain = chain };
 	size_t i = k->first;
 
-	while (i < t->lit.n && lit[i].chain != chain)
+	while (i < t->arrivals.n && arrival[i].chain != chain)
 		i++;
-	if (i == t->lit.n && mem_append(&t->lit, &new, 1, sizeof new, &t->tally.err))
+	if (i == t->arrivals.n && mem_append(&t->arrivals, &new, 1, sizeof new, &t->tally.err))
 		return;
-	lit = (struct lit *)t->lit.data + i;
-	lit->value += w;
-	v3_mad(lit->toward, w, toward, lit->toward);
+	arrival = (struct light_arrival *)t->arrivals.data + i;
+	arrival->value += w;
+	v3_mad(arrival->toward, w, toward, arrival->toward);
 }
 
 static void look_from(struct ff_thread *t, struct look *k, const double x[3])
 {
 	double from[3] = { x[0], x[1], x[2] };
-	struct light_sight s;
+	struct light_sample s;
 	uint32_t chain = CHAIN_NONE;
 
 	model_light_see(k->l, k->light, x, k->clear, &s);
@@ -91,8 +91,8 @@ static void look_from(struct ff_thread *t, struct look *k, const double x[3])
 	k->seen += w;
 	k->squares[1] += all * w;
 	k->squares[2] += w * w;
-	k->full += s.falloff >= 1 && t->lit.n > k->first &&
-	           ((struct lit *)t->lit.data)[k->first].chain == chain;
+	k->full += s.falloff >= 1 && t->arrivals.n > k->first &&
+	           ((struct light_arrival *)t->arrivals.data)[k->first].chain == chain;
 }
 
 static void look(struct ff_thread *t, struct look *k, uint32_t points)
@@ -124,16 +124,16 @@ static double whole_flux(const struct model *m, const struct look *k)
 /* From summed weights to fractions of the light's flux. */
 static void weigh(struct ff_thread *t, const struct look *k)
 {
-	struct lit *lit = t->lit.data;
+	struct light_arrival *arrival = t->arrivals.data;
 	double scale = whole_flux(t->job->m, k) / k->l->unit_flux[k->light] / k->all;
 	double part = k->seen / k->all, spread = 0;
 
 	if (k->full < k->points) /* of a ratio estimate: Cochran, Sampling Techniques, 6.4 */
 		spread = fmax(0, k->squares[2] - 2 * part * k->squares[1] +
 		                 part * part * k->squares[0]);
-	for (size_t i = k->first; i < t->lit.n; i++) {
-		lit[i].variance = spread * scale * scale * lit[i].value / k->seen;
-		lit[i].value *= scale;
+	for (size_t i = k->first; i < t->arrivals.n; i++) {
+		arrival[i].variance = spread * scale * scale * arrival[i].value / k->seen;
+		arrival[i].value *= scale;
 	}
 }
 
@@ -162,14 +162,14 @@ static void light_element(struct ff_thread *t, const struct look *from, uint32_t
 
 	if (side < 0)
 		return;
-	k.first = t->lit.n;
+	k.first = t->arrivals.n;
 	k.column = 2 * element + (uint32_t)side;
 	k.seed = rng_mix(from->seed ^ rng_mix(element));
 	ff_normal(j, element, side, k.normal);
 	look(t, &k, POINTS_FIRST);
 	if (k.full < k.points && k.none < k.points)
 		look(t, &k, most > POINTS_LEAST ? most : POINTS_LEAST);
-	if (t->lit.n > k.first)
+	if (t->arrivals.n > k.first)
 		weigh(t, &k);
 }
 
@@ -181,7 +181,7 @@ static void light_elements(struct ff_thread *t, size_t light)
 	struct look k = { .l = &g->l, .clear = ray_offset(j->rays),
 	                  .seed = rng_mix(j->o.seed ^ rng_mix(light)) };
 
-	t->lit.n = 0;
+	t->arrivals.n = 0;
 	for (size_t i = 0; i < g->l.n; i++) {
 		if (g->origin[i] != light)
 			continue;
@@ -219,34 +219,34 @@ static uint32_t cast(struct ff_thread *t, size_t light)
  * among it. */
 static void fit(struct array *all)
 {
-	struct lit *lit = all->data;
+	struct light_arrival *arrival = all->data;
 	double sure = 0, doubtful = 0;
 
 	for (size_t i = 0; i < all->n; i++)
-		if (lit[i].chain == 0)
-			*(lit[i].variance > 0 ? &doubtful : &sure) += lit[i].value;
+		if (arrival[i].chain == 0)
+			*(arrival[i].variance > 0 ? &doubtful : &sure) += arrival[i].value;
 	for (size_t i = 0; i < all->n && doubtful > 0 && sure < 1; i++)
-		if (lit[i].chain == 0 && lit[i].variance > 0)
-			lit[i].value *= (1 - sure) / doubtful;
+		if (arrival[i].chain == 0 && arrival[i].variance > 0)
+			arrival[i].value *= (1 - sure) / doubtful;
 }
 
 /* What elements saw into the tally, whose weights count `rays` as 1. Returns the part
  * that came by chain 0. */
 static double put_straight(struct ff_thread *t, double rays)
 {
-	const struct lit *lit = t->lit.data;
+	const struct light_arrival *arrival = t->arrivals.data;
 	const struct model *m = t->job->m;
 	double first = 0;
 
-	for (size_t i = 0; i < t->lit.n; i++) {
-		uint32_t ps = 2 * m->element.patch[lit[i].column >> 1] + (lit[i].column & 1);
-		double back[3] = { -lit[i].toward[0], -lit[i].toward[1], -lit[i].toward[2] };
-		first += lit[i].chain == 0 ? lit[i].value : 0;
+	for (size_t i = 0; i < t->arrivals.n; i++) {
+		uint32_t ps = 2 * m->element.patch[arrival[i].column >> 1] + (arrival[i].column & 1);
+		double back[3] = { -arrival[i].toward[0], -arrival[i].toward[1], -arrival[i].toward[2] };
+		first += arrival[i].chain == 0 ? arrival[i].value : 0;
 		v3_normalise(back);
 		if (t->job->is_black[ps])
-			ff_tally_rest(&t->tally, lit[i].chain)->black += lit[i].value * rays;
+			ff_tally_rest(&t->tally, arrival[i].chain)->black += arrival[i].value * rays;
 		else
-			ff_tally_hit(&t->tally, lit[i].chain, lit[i].column, lit[i].value * rays, back);
+			ff_tally_hit(&t->tally, arrival[i].chain, arrival[i].column, arrival[i].value * rays, back);
 	}
 	return first;
 }
@@ -255,11 +255,11 @@ static double put_straight(struct ff_thread *t, double rays)
  * parts f would have variances that add up to f / n. 0 if all is exact. */
 static uint32_t worth(const struct ff_thread *t, double rays, double straight)
 {
-	const struct lit *lit = t->lit.data;
+	const struct light_arrival *arrival = t->arrivals.data;
 	double turned = t->turned / rays, variance = turned / rays;
 
-	for (size_t i = 0; i < t->lit.n; i++)
-		variance += lit[i].variance;
+	for (size_t i = 0; i < t->arrivals.n; i++)
+		variance += arrival[i].variance;
 	if (!(variance > 0))
 		return 0;
 	double n = (straight + turned) / variance;
@@ -276,7 +276,7 @@ int ff_light_row(struct ff_thread *t, uint32_t light, struct ff_batch *b, struct
 	light_elements(t, light);
 	int open = ff_tally_rest(&t->tally, 0)->escape > 0;
 	if (!open)
-		fit(&t->lit);
+		fit(&t->arrivals);
 	double straight = put_straight(t, rays);
 	ff_tally_rest(&t->tally, 0)->escape = open ? fmax(0, 1 - straight) * rays : 0;
 	return ff_tally_finish(&t->tally, b, (uint32_t)(2 * m->patch.n) + light, FF_LIGHT,
@@ -295,7 +295,7 @@ int ff_light_incident(struct ff_thread *t, uint32_t ps, struct err *e)
 		for (uint32_t i = 0; i < CAPTURES; i++) {
 			struct ff_incident c = { .source = (uint32_t)(2 * j->m->patch.n) + light,
 			                     .view = i % j->o.points };
-			struct light_sight s;
+			struct light_sample s;
 			double n[3], from[3];
 			c.element = ff_point(j, ps >> 1, rng_sobol(i, 0, seed), rng_sobol(i, 1, seed), c.x);
 			ff_normal(j, c.element, (int)(ps & 1), n);

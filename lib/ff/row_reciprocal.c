@@ -26,6 +26,9 @@ static const double larger = 2.2, enough = .11;
 /* How far the sum of reciprocal factors may be from what must land there, a fraction; a guess. */
 static const double misfit = .25;
 
+/* ... besides so many standard errors: one in 400 by chance. */
+static const double unlikely = 3;
+
 /* Of the rays of an element, as many as so many independent ones to the irradiance: they are
  * stratified, and what one patch gets too many of them another lacks. Measured: 1.2 n^.4
  * within 4 % in a closed room with n from 64 to 1024, for whose standard errors that is
@@ -137,14 +140,14 @@ static int transpose(struct gatherer *g, struct err *e)
 			to->start[((struct pair *)g->pairs[p].data)[i].source + 1]++;
 	for (size_t ps = 0; ps < sides; ps++)
 		to->start[ps + 1] += to->start[ps];
-	to->seen = mem_new(to->start[sides], sizeof *to->seen, "gathered light", e);
-	if (!to->seen)
+	to->hits = mem_new(to->start[sides], sizeof *to->hits, "gathered light", e);
+	if (!to->hits)
 		return -1;
 	for (size_t p = 0; p < patches; p++) {
 		const struct pair *pair = g->pairs[p].data, *last = pair + g->pairs[p].n;
 		for (; place < 2 * (size_t)g->job->m->patch.start[p + 1]; place++)
 			for (uint32_t k = g->pairs_of[place]; k && pair < last; k--, pair++)
-				to->seen[to->start[pair->source]++] = (struct ff_receiver_hits){
+				to->hits[to->start[pair->source]++] = (struct ff_receiver_hits){
 					g->job->places.column[place], pair->count };
 		free(g->pairs[p].data);
 		g->pairs[p] = (struct array){ 0 };
@@ -230,7 +233,7 @@ static int any_takes(const struct ff_job *j)
 	return takes(most, j->o.rays, least, j->o.gather);
 }
 
-/* Rows by formula are made of sights too, whatever their sizes. */
+/* Rows by formula are made of shares too, whatever their sizes. */
 static int any_by_formula(const struct ff_job *j)
 {
 	for (uint32_t ps = 0; ps < 2 * j->m->patch.n; ps++)
@@ -279,7 +282,7 @@ int ff_reciprocal_cast(struct ff_job *j, double *rays, const struct progress *pr
 void ff_reciprocal_free(struct ff_reciprocal *g)
 {
 	free(g->start);
-	free(g->seen);
+	free(g->hits);
 	free(g->centre);
 	free(g->escape);
 	free(g->black);
@@ -314,7 +317,7 @@ int ff_row_is_reciprocal(const struct ff_job *j, uint32_t ps)
 		return 1;
 	if (i == end)
 		return 0;
-	while (i < end && element_takes(j, ps, g->seen[i].column))
+	while (i < end && element_takes(j, ps, g->hits[i].column))
 		i++;
 	return i == end;
 }
@@ -328,10 +331,10 @@ static double reciprocal_shares(struct ff_thread *t, uint32_t ps)
 
 	t->shares.n = 0;
 	for (uint64_t i = g->start[ps]; i < g->start[ps + 1]; i++) {
-		uint32_t element = g->seen[i].column >> 1;
-		double n = g->seen[i].count, rays = ff_reciprocal_rays(j, element);
+		uint32_t element = g->hits[i].column >> 1;
+		double n = g->hits[i].count, rays = ff_reciprocal_rays(j, element);
 		double one = j->m->element.area[element] / (j->m->patch.area[ps >> 1] * rays);
-		struct ff_share s = { g->seen[i].column, one * n, one * one * n * (1 - n / rays) };
+		struct ff_share s = { g->hits[i].column, one * n, one * one * n * (1 - n / rays) };
 		if (!element_takes(j, ps, s.column))
 			continue;
 		if (mem_append(&t->shares, &s, 1, sizeof s, &t->tally.err))
@@ -365,7 +368,7 @@ static double own_landed(const struct ff_thread *t, uint32_t ps, uint32_t cast)
 	return sum / cast;
 }
 
-/* What sights of elements add up to, and how sure it is. */
+/* What shares of elements add up to, and how sure it is. */
 struct share_sum {
 	double sum, variance;
 	double doubt;             /* summed standard errors */
@@ -391,8 +394,8 @@ static struct share_sum add_up(const struct ff_thread *t, double sum)
 }
 
 /* The part of a row that lands on elements, of which so many rays say `lands`: the mean of
- * that and of what the elements' sights add up to, each for as much as it is certain. Where
- * no ray goes elsewhere, so it is, if the sights do not surely deny it. */
+ * that and of what the elements' shares add up to, each for as much as it is certain. Where
+ * no ray goes elsewhere, so it is, if the shares do not surely deny it. */
 static double combine_landed(double lands, double rays, const struct share_sum *a)
 {
 	double own = fmax(lands * (1 - lands), 1 / rays) / rays;
@@ -411,8 +414,8 @@ static void guess_arrival(struct ff_thread *t, uint32_t ps, uint32_t target)
 		v3_sub(t->job->reciprocal.centre[ps >> 1], t->job->reciprocal.centre[target >> 1], toward);
 }
 
-/* The sights, scaled, in place of what the row's own rays say of the same elements. */
-static void put_sights(struct ff_thread *t, uint32_t ps, double scale)
+/* The shares, scaled, in place of what the row's own rays say of the same elements. */
+static void put_shares(struct ff_thread *t, uint32_t ps, double scale)
 {
 	const struct ff_job *j = t->job;
 	const struct ff_share *s = t->shares.data;
@@ -450,20 +453,20 @@ static double landing(const struct ff_thread *t, uint32_t ps, uint32_t cast, dou
 int ff_combine_estimates(struct ff_thread *t, uint32_t ps, uint32_t cast, struct ff_weight *w)
 {
 	const struct ff_job *j = t->job;
-	int seen = ff_row_is_of_emitter(j, ps);
-	double sum = seen ? ff_emitter_row(t, ps, ff_row_rays(j, ps), &t->tally.err) : reciprocal_shares(t, ps);
+	int of_emitter = ff_row_is_of_emitter(j, ps);
+	double sum = of_emitter ? ff_emitter_row(t, ps, ff_row_rays(j, ps), &t->tally.err) : reciprocal_shares(t, ps);
 	struct share_sum a = add_up(t, sum);
 	double rays, said = landing(t, ps, cast, &rays), lands = combine_landed(said, rays, &a);
-	double per_sample = a.sample / (seen ? 1 : worth(j->reciprocal.rays));
+	double per_sample = a.sample / (of_emitter ? 1 : worth(j->reciprocal.rays));
 
 	if (t->tally.err.set || !(lands > 0 && sum > 0) ||
-	    fabs(sum - said) > misfit * said + 3 * sqrt(fmax(sum, said) / rays))
+	    fabs(sum - said) > misfit * said + unlikely * sqrt(fmax(sum, said) / rays))
 		return 0;
 	/* What rays brought elsewhere stays as it is: the whole is what makes that 1 - lands. */
 	double total = !cast ? 1 : said < 1 && lands < 1 ? cast * (1 - said) / (1 - lands) : cast;
 	if (!cast)
 		book_lost(t, ps, 1 - lands);
-	put_sights(t, ps, total * lands / sum);
+	put_shares(t, ps, total * lands / sum);
 	per_sample += cast ? (1 - lands) / cast : 0;
 	*w = (struct ff_weight){ (uint32_t)fmax(1, fmin(UINT32_MAX, 1 / per_sample)), total };
 	return 1;

@@ -97,6 +97,7 @@ int ff_find_chain_limit(struct ff_job *j, struct err *e)
 		t.rng = rng_seed(j->o.seed, 0);
 		send(&t);
 		bad = t.tally.err.set ? err_set(e, "%s", t.tally.err.text) : 0;
+		/* Three quarters a try: near the aim, in few tries. A guess. */
 		while (!bad && (n = count_chains(j, &t.tally.chains, j->chain_most, e)) > aim &&
 		       n != CHAIN_NONE && j->chain_most > CHANGES)
 			j->chain_most = (j->chain_most * 3 + 1) / 4;

@@ -37,7 +37,7 @@ struct ff_samples {
 	uint32_t *bits;           /* [FF_DIMS][n] */
 };
 
-/* What elements saw: hits of their rays on each patch-side that shoots. */
+/* Hits of elements' rays on each patch-side that shoots. */
 struct ff_receiver_hits {
 	uint32_t column, count;   /* element-side, its rays that landed here */
 };
@@ -46,7 +46,7 @@ struct ff_reciprocal {
 	uint32_t rays;            /* from an element-side; 0: nothing was gathered */
 	int alone;                /* no ideal surfaces: all that rows tell is where rays land */
 	uint64_t *start;          /* [2P+1] of a patch-side, ordered by place */
-	struct ff_receiver_hits *seen;
+	struct ff_receiver_hits *hits;
 	double (*centre)[4];      /* [P] of a patch, and the distance of its farthest vertex */
 	double *escape, *black;   /* [2P] parts of what leaves a patch-side, the same rays
 	                             taken as its own */
@@ -129,7 +129,7 @@ struct ff_thread {
 	struct view *view;        /* hemicube: [points][2 sides] */
 	double rays;
 	struct array shares;      /* struct ff_share */
-	struct array lit;         /* struct lit, of the light in work */
+	struct array arrivals;    /* struct light_arrival, of the light in work */
 	struct exchanger *formula; /* NULL: nothing is computed by formula */
 	struct ff_ray_batch lobe; /* lobe rays waiting to be cast */
 	uint32_t lobes;

@@ -20,7 +20,7 @@ static int pass(void *arg, uint32_t material, int arrival, int transmitted)
 }
 
 uint32_t ff_light_chain(struct ff_thread *t, size_t image, const double from[3],
-                        const struct light_sight *s)
+                        const struct light_sample *s)
 {
 	struct path p = { t, 0, 0 };
 	uint64_t cast = 0;

@@ -15,7 +15,7 @@ static void direct_light(const struct ff_job *j, double *flux)
 
 	for (uint32_t source = 0; source < 2 * j->m->patch.n; source++)
 		for (uint64_t i = g->start[source]; j->emits[source] && i < g->start[source + 1]; i++) {
-			const struct ff_receiver_hits *s = &g->seen[i];
+			const struct ff_receiver_hits *s = &g->hits[i];
 			uint32_t el = s->column >> 1, ps = 2 * j->m->element.patch[el] + (s->column & 1);
 			flux[ps] += j->m->element.area[el] * s->count / ff_reciprocal_rays(j, el);
 		}

@@ -67,9 +67,10 @@ static int go_on(struct ff_thread *t, const struct flight *in, const struct ray_
 	if (chain == CHAIN_NONE)
 		return 0;
 	/* A chain that leads back to itself is summed as a series, of which so many rounds
-	 * are sample enough, as many of each ray; a longer chain is not followed. */
+	 * are sample enough, as many of each ray; a longer chain is not followed. The rounds are
+	 * even, as two mirrors take turns, and a quarter of the depth: a guess. */
 	int coloured = t->tally.chains.most[slot] > 1;
-	uint32_t rounds = t->job->o.depth / 8 * 2 + 2; /* even: two mirrors take turns */
+	uint32_t rounds = t->job->o.depth / 8 * 2 + 2;
 	out->round = chain == in->chain ? in->round + (uint32_t)coloured : 0;
 	out->idle = coloured ? 0 : in->idle + 1;
 	if (out->round >= rounds || out->idle > t->job->o.depth)

@@ -7,14 +7,14 @@ int ff_formula_init(struct ff_formula *f, const struct model *m, int all, struct
 	occ_facet_centre(m, f->centre);
 	return occ_facet_set_init(&f->sources, m, FACETS_OF_PATCHES, e) ||
 	       occ_facet_set_init(&f->receivers, m, FACETS_OF_ELEMENTS, e) ||
-	       occ_occluder_set_init(&f->bodies, m, e) ? -1 : 0;
+	       occ_occluder_set_init(&f->occluders, m, e) ? -1 : 0;
 }
 
 void ff_formula_free(struct ff_formula *f)
 {
 	occ_facet_set_free(&f->sources);
 	occ_facet_set_free(&f->receivers);
-	occ_occluder_set_free(&f->bodies);
+	occ_occluder_set_free(&f->occluders);
 	*f = (struct ff_formula){ 0 };
 }
 

@@ -8,7 +8,7 @@ struct ff_formula {
 	int on;                   /* anything is computed by formula */
 	int all;                  /* of all plane patch-sides, not only of emitters */
 	struct facet_set sources, receivers; /* patch-sides, element-sides */
-	struct occluder_set bodies;
+	struct occluder_set occluders;
 	double centre[3];
 };
 

@@ -72,13 +72,13 @@ int ff_tally_init(struct tally *t, const struct model *m, const struct tally_pla
 		return -1;
 	t->count = mem_new(sides, sizeof *t->count, "row tally", e);
 	t->dense = mem_new(sides, sizeof *t->dense, "row tally", e);
-	t->seen = mem_new(64 * t->words, sizeof *t->seen, "row tally", e);
-	t->words_seen = mem_new(t->words, sizeof *t->words_seen, "row tally", e);
+	t->touched = mem_new(64 * t->words, sizeof *t->touched, "row tally", e);
+	t->words_touched = mem_new(t->words, sizeof *t->words_touched, "row tally", e);
 	t->replicate = mem_new(2 * m->patch.n, sizeof *t->replicate, "row tally", e);
 	t->square = mem_new(2 * m->patch.n, sizeof *t->square, "row tally", e);
 	t->variance = mem_new(2 * m->patch.n, sizeof *t->variance, "row tally", e);
 	t->toward = mem_new(2 * m->patch.n, sizeof *t->toward, "row tally", e);
-	if (!t->count || !t->dense || !t->seen || !t->words_seen || !t->replicate ||
+	if (!t->count || !t->dense || !t->touched || !t->words_touched || !t->replicate ||
 	    !t->square || !t->variance || !t->toward)
 		return -1;
 	slot_of(t, 0); /* chain 0 is slot 0 of every row */
@@ -87,7 +87,7 @@ int ff_tally_init(struct tally *t, const struct model *m, const struct tally_pla
 
 void ff_tally_free(struct tally *t)
 {
-	void *array[] = { t->count, t->dense, t->seen, t->words_seen, t->replicate,
+	void *array[] = { t->count, t->dense, t->touched, t->words_touched, t->replicate,
 		t->square, t->variance, t->toward, t->rest.data, t->slot_chain.data,
 		t->chain_slot.data, t->arrival.data };
 
@@ -125,7 +125,7 @@ static void hit_near(struct tally *t, uint32_t place, uint32_t ps, double w)
 	t->weighed = 1;
 	t->dense[place] += w;
 	t->replicate[ps] += w;
-	ff_tally_see(t, place);
+	ff_tally_touch(t, place);
 }
 
 static void hit_far(struct tally *t, uint32_t chain, uint32_t place, uint32_t element_side,
@@ -159,20 +159,20 @@ uint32_t ff_tally_next(const struct tally *t, uint64_t place)
 {
 	if (place >> 12 >= t->words)
 		return UINT32_MAX;
-	uint64_t bits = t->seen[place >> 6] >> (place & 63);
+	uint64_t bits = t->touched[place >> 6] >> (place & 63);
 	if (bits)
 		return (uint32_t)(place + (uint64_t)__builtin_ctzll(bits));
 	uint64_t word = (place >> 6) + 1;
-	bits = word & 63 ? t->words_seen[word >> 6] >> (word & 63) : 0;
+	bits = word & 63 ? t->words_touched[word >> 6] >> (word & 63) : 0;
 	if (!bits) {
 		for (word = (word + 63) & ~(uint64_t)63; word >> 6 < t->words; word += 64)
-			if ((bits = t->words_seen[word >> 6]))
+			if ((bits = t->words_touched[word >> 6]))
 				break;
 		if (!bits)
 			return UINT32_MAX;
 	}
 	word += (uint64_t)__builtin_ctzll(bits);
-	return (uint32_t)(64 * word + (uint64_t)__builtin_ctzll(t->seen[word]));
+	return (uint32_t)(64 * word + (uint64_t)__builtin_ctzll(t->touched[word]));
 }
 
 double ff_tally_counted(const struct tally *t, uint32_t place)
@@ -189,7 +189,7 @@ void ff_tally_set(struct tally *t, uint32_t place, double w, double variance)
 	memset(t->count[place], 0, sizeof t->count[place]);
 	t->dense[place] = w;
 	t->variance[ff_tally_side_at(t, place)] += variance;
-	ff_tally_see(t, place);
+	ff_tally_touch(t, place);
 }
 
 uint32_t ff_tally_side_at(const struct tally *t, uint32_t place)
@@ -299,9 +299,9 @@ static int finish_near(struct tally *t, struct ff_batch *b, struct finish *f, st
 		place = ff_tally_next(t, ff_tally_side_end(t, ps));
 	}
 	for (size_t word = 0; word < t->words; word++) {
-		for (uint64_t left = t->words_seen[word]; left; left &= left - 1)
-			t->seen[64 * word + (size_t)__builtin_ctzll(left)] = 0;
-		t->words_seen[word] = 0;
+		for (uint64_t left = t->words_touched[word]; left; left &= left - 1)
+			t->touched[64 * word + (size_t)__builtin_ctzll(left)] = 0;
+		t->words_touched[word] = 0;
 	}
 	return 0;
 }

@@ -31,8 +31,8 @@ struct tally {
 	/* Chain 0, by place: landings of weight 1 in each replicate, and other weights. */
 	uint32_t (*count)[TALLY_REPLICATES];
 	double *dense;
-	uint64_t *seen, *words_seen; /* bits of places with either, and of words of those */
-	size_t words;              /* of words_seen */
+	uint64_t *touched, *words_touched; /* bits of places with either, and of words of those */
+	size_t words;              /* of words_touched */
 	int weighed;               /* any other weights */
 	double *replicate;         /* [2P] other weights, the current replicate */
 	double *square;            /* [2P] their sums of squares over replicates */
@@ -61,10 +61,10 @@ int ff_tally_init(struct tally *t, const struct model *m, const struct tally_pla
                   const uint8_t *has_lobe, uint32_t chain_most, struct err *e);
 void ff_tally_free(struct tally *t);
 
-static inline void ff_tally_see(struct tally *t, uint32_t place)
+static inline void ff_tally_touch(struct tally *t, uint32_t place)
 {
-	t->seen[place >> 6] |= (uint64_t)1 << (place & 63);
-	t->words_seen[place >> 12] |= (uint64_t)1 << (place >> 6 & 63);
+	t->touched[place >> 6] |= (uint64_t)1 << (place & 63);
+	t->words_touched[place >> 12] |= (uint64_t)1 << (place >> 6 & 63);
 }
 
 /* A landing of weight 1 by chain 0 at a place without a lobe. */
@@ -73,7 +73,7 @@ static inline void ff_tally_count(struct tally *t, uint32_t place)
 	int r = t->replicates < TALLY_REPLICATES ? t->replicates : TALLY_REPLICATES - 1;
 
 	t->count[place][r]++;
-	ff_tally_see(t, place);
+	ff_tally_touch(t, place);
 }
 
 /* Weight w of the row's flux arriving by `chain` on an element-side, travelling
@@ -82,10 +82,10 @@ void ff_tally_hit(struct tally *t, uint32_t chain, uint32_t element_side, double
                   const double dir[3]);
 
 /* What became of flux of `chain` that lands nowhere. The pointer is good until
- * the next call with a chain not seen in this row. */
+ * the next call with a chain that is new in this row. */
 struct tally_rest *ff_tally_rest(struct tally *t, uint32_t chain);
 
-/* The first place seen in chain 0 at or after `place`, or UINT32_MAX; the patch-side of
+/* The first place touched in chain 0 at or after `place`, or UINT32_MAX; the patch-side of
  * a place, and the place after its last. */
 uint32_t ff_tally_next(const struct tally *t, uint64_t place);
 uint32_t ff_tally_side_at(const struct tally *t, uint32_t place);

@@ -55,9 +55,11 @@ void geo_pair_fill(const struct facet *f, struct cubature_pair *j)
 /* The error is of the sixth order in r / d where both heights hardly vary over the facets, of
  * the fifth or fourth where one or both do. Over 100 000 pairs of squares, rectangles and
  * parallelograms of radii in ratios to 100, most of them touching the other's plane, it
- * stayed below .85 of .75 r^6 + .15 r^5 d (ra / hb + rb / ha) + .025 r^4 d^2 ra rb / (ha hb),
+ * stayed below .85 of sixth r^6 + fifth r^5 d (ra / hb + rb / ha) + fourth r^4 d^2 ra rb / (ha hb),
  * by d^6; r d is below 6 r^2 + d^2 / 24. What is skew errs by its second moments. No
- * command repeats the fit; test_polygon checks the bound for some pairs (test_joint). */
+ * command repeats the fit; test_polygon checks the bound for some pairs (test_fitted_pair). */
+static const double sixth = .75, fifth = .15, fourth = .025;
+
 int geo_pair_reaches(const struct facet *a, const struct cubature_pair *ja, const struct facet *b,
                      const struct cubature_pair *jb, double tolerance)
 {
@@ -67,8 +69,8 @@ int geo_pair_reaches(const struct facet *a, const struct cubature_pair *ja, cons
 
 	v3_sub(b->centre, a->centre, d);
 	double r2 = v3_dot(d, d), left = tolerance * r2 - (ja->skew + jb->skew) * s;
-	double vary = (.9 * s + .15 / 24 * r2) * (b->radius * hb + a->radius * ha);
-	return s * s * (.75 * s * ha * hb + vary + .025 * r2 * a->radius * b->radius) <=
+	double vary = (6 * fifth * s + fifth / 24 * r2) * (b->radius * hb + a->radius * ha);
+	return s * s * (sixth * s * ha * hb + vary + fourth * r2 * a->radius * b->radius) <=
 	       left * ha * hb * r2 * r2;
 }
 
@@ -202,9 +204,9 @@ static four_mask quad_reaches(const struct quad *a, const struct quad *b, four h
 		d[k] = number(b, CENTRE + k) - number(a, CENTRE + k);
 	four r2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], s = (ra + rb) * (ra + rb);
 	four left = tolerance * r2 - (number(a, SKEW) + number(b, SKEW)) * s;
-	four vary = (.9 * s + .15 / 24 * r2) * (rb * hb + ra * ha);
+	four vary = (6 * fifth * s + fifth / 24 * r2) * (rb * hb + ra * ha);
 	return (hb >= ra) & (ha >= rb) &
-	       (s * s * (.75 * s * ha * hb + vary + .025 * r2 * ra * rb) <=
+	       (s * s * (sixth * s * ha * hb + vary + fourth * r2 * ra * rb) <=
 	        left * ha * hb * r2 * r2);
 }
 

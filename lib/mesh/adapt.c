@@ -151,7 +151,7 @@ static uint8_t halvings_with(const struct plan *p, uint32_t patch)
 	double elements = p->m->patch.start[patch + 1] - p->m->patch.start[patch];
 	double wanted = p->patch_halvings[patch] + log2(ELEMENTS_A_PATCH / elements);
 
-	if (!p->patch_halvings[patch] || !(wanted > .5))
+	if (!p->patch_halvings[patch] || !(wanted > .5)) /* rounds to none */
 		return 0;
 	return (uint8_t)fmin(HALVINGS_MAX, wanted + .5);
 }
@@ -256,7 +256,7 @@ static void count_marked(const struct plan *p, double bound, struct mesh_report 
 	for (size_t i = 0; i < p->m->patch.n; i++) {
 		r->patches_marked += p->patch_energy[i] > bound;
 		r->patches_for_lobes += p->patch_energy[i] > bound &&
-		                        p->lobe_energy[i] > .5 * p->patch_energy[i];
+		                        2 * p->lobe_energy[i] > p->patch_energy[i];
 	}
 }
 

@@ -10,6 +10,9 @@
 #include "lib/geometry/half_edge.h"
 #include "lib/mesh/stages.h"
 
+/* Sine of what a triangle of a plane quad may stand out of the other's plane by. A guess. */
+static const double in_plane = 1e-6;
+
 /* Triangles a (and b) have these corners, as sorted positions; position[3] is
  * unused for single triangles. */
 struct shape {
@@ -128,7 +131,7 @@ static int plane_quad(const struct model *m, uint32_t g, uint32_t h)
 	v3_sub(&m->vertex[3 * (size_t)geo_half_edge_apex(m->triangle.corner, h)],
 	       &m->vertex[3 * (size_t)geo_half_edge_from(m->triangle.corner, g)], d);
 	v3_normalise(n);
-	return v3_dot(n, o) > 0 && fabs(v3_dot(n, d)) <= 1e-6 * v3_length(d);
+	return v3_dot(n, o) > 0 && fabs(v3_dot(n, d)) <= in_plane * v3_length(d);
 }
 
 /* Quads with the same corners: those that lose both triangles to the first. */

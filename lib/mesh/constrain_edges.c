@@ -13,6 +13,10 @@
  * far above what is needed. */
 enum { STEPS_MAX = 100000 };
 
+/* A triangle lower than so many times `apart` is not cut: points that are not one would have no
+ * room in it. A guess. */
+enum { LEAST_HEIGHT = 4 };
+
 /* What rounding may leave between two points in line, a fraction of `apart`. A guess. */
 static const double nearer = 1e-3;
 
@@ -354,7 +358,7 @@ int mesh_constrain_edges(const struct model *m, const struct half_edges *g,
 	for (size_t i = 0, next; !status && i < n; i = next) {
 		for (next = i + 1; next < n && list[next].triangle == list[i].triangle; next++)
 			;
-		if (too_thin(m, list[i].triangle, 4 * limits->apart))
+		if (too_thin(m, list[i].triangle, LEAST_HEIGHT * limits->apart))
 			continue;
 		status = cut_triangle(&c, &list[i], next - i, &ends);
 		p->cut++;

@@ -115,6 +115,10 @@ static uint32_t next_boundary(const struct tracer *t, uint32_t h)
 	}
 }
 
+/* Of what is straight but for rounding: the sine of its angle, a guess; and how far, in units of the
+ * largest coordinate, a corner lies from where it was meant to: eight units in the last place. */
+static const double straight_sine = 1e-9, rounding = 0x1p-49;
+
 /* Does b lie on the straight way from a to c, but for rounding? */
 static int straight(const struct tracer *t, uint32_t a, uint32_t b, uint32_t c)
 {
@@ -128,8 +132,8 @@ static int straight(const struct tracer *t, uint32_t a, uint32_t b, uint32_t c)
 		largest = fmax(largest, fabs(vertex(t, b)[k]));
 	double length = v3_length(u) + v3_length(v);
 	v3_cross(u, v, w);
-	return v3_length(w) <= length * (1e-9 * fmin(v3_length(u), v3_length(v)) +
-	                                 0x1p-49 * largest);
+	return v3_length(w) <= length * (straight_sine * fmin(v3_length(u), v3_length(v)) +
+	                                 rounding * largest);
 }
 
 /* Takes the corners that lie on straight edges out of the loop corner[begin ...]. */

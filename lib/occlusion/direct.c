@@ -441,7 +441,7 @@ static void add_lights(struct direct_worker *w, const double world[3], double *h
 
 	ray_leave(w->d->rays, w->normal, from);
 	for (size_t i = 0; i < m->light.n; i++) {
-		struct light_sight s;
+		struct light_sample s;
 		model_light_see(&m->light, i, world, ray_offset(w->d->rays), &s);
 		double scale = v3_dot(w->normal, s.toward) * s.across * s.falloff;
 		if (!(scale > 0))

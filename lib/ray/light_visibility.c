@@ -126,12 +126,12 @@ static int walk_to_mirror(struct walk *k, const struct mirror_plane *plane, cons
 }
 
 int ray_light_walk(const struct light_visibility *w, size_t image, const double from[3],
-                   const struct light_sight *s, ray_light_pass_fn *pass, void *arg,
+                   const struct light_sample *s, ray_light_pass_fn *pass, void *arg,
                    uint64_t *cast)
 {
 	const struct light_images *g = &w->images;
 	struct walk k = { w, pass, arg, cast, { from[0], from[1], from[2] } };
-	struct light_sight at = *s;
+	struct light_sample at = *s;
 
 	for (; g->plane[image] >= 0; image = g->parent[image]) {
 		if (!walk_to_mirror(&k, &g->mirrors.plane[g->plane[image]], at.toward))
@@ -169,7 +169,7 @@ int ray_light_transmittance(const struct light_visibility *w, const double from[
 }
 
 int ray_light_visibility(const struct light_visibility *w, size_t image, const double from[3],
-                         const struct light_sight *s, double *value, uint64_t *cast)
+                         const struct light_sample *s, double *value, uint64_t *cast)
 {
 	struct tint t = { &w->m->material, value, 0 };
 

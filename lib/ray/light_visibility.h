@@ -9,7 +9,7 @@
 #include "lib/base/err.h"
 #include "lib/ray/mirror.h"
 
-struct light_sight;
+struct light_sample;
 struct ray_scene;
 
 /* A scene and the images of its lights. */
@@ -36,7 +36,7 @@ typedef int ray_light_pass_fn(void *arg, uint32_t material, int arrival, int tra
  * order. 1 if the light's rays come this way; 0 if anything else is between or pass said so.
  * Adds the rays that took to *cast. O((panes + mirrors) log triangles). */
 int ray_light_walk(const struct light_visibility *w, size_t image, const double from[3],
-                   const struct light_sight *s, ray_light_pass_fn *pass, void *arg,
+                   const struct light_sample *s, ray_light_pass_fn *pass, void *arg,
                    uint64_t *cast);
 
 /* Multiplies value[bands] by what clear panes between two points, both just off their
@@ -48,6 +48,6 @@ int ray_light_transmittance(const struct light_visibility *w, const double from[
 /* The same for the way that ray_light_walk takes. What mirrors absorb is in the image's
  * intensity already. */
 int ray_light_visibility(const struct light_visibility *w, size_t image, const double from[3],
-                         const struct light_sight *s, double *value, uint64_t *cast);
+                         const struct light_sample *s, double *value, uint64_t *cast);
 
 #endif

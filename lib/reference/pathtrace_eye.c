@@ -110,7 +110,7 @@ static void add_direct(const struct pathtrace *p, const struct eye_path *path,
 /* How a vertex sees a light or image; returns its irradiance, mean of the bands, if nothing is
  * between. */
 static double light_irradiance(const struct pathtrace *p, const struct vertex *v, size_t light,
-                               struct light_sight *s)
+                               struct light_sample *s)
 {
 	const struct lights *l = &p->ways.images.l;
 	const double *intensity = &l->intensity[light * (size_t)p->m->bands];
@@ -130,7 +130,7 @@ static void add_light(const struct pathtrace *p, const struct eye_path *path,
 	const double *intensity = &p->ways.images.l.intensity[light * (size_t)m->bands];
 	double wo[3] = { -path->dir[0], -path->dir[1], -path->dir[2] };
 	double f[BANDS_MAX], from[3], any = 0;
-	struct light_sight s;
+	struct light_sample s;
 	uint64_t rays = 0;
 
 	light_irradiance(p, v, light, &s);
@@ -156,7 +156,7 @@ static void add_lights(const struct pathtrace *p, const struct eye_path *path,
 {
 	double sum = 0, left, here;
 	size_t n = p->ways.images.l.n, all = path->sharp && n <= LIGHTS_ALL;
-	struct light_sight s;
+	struct light_sample s;
 
 	for (size_t i = 0; i < n; i++) {
 		if (all)

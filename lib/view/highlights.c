@@ -17,7 +17,7 @@ void view_highlights(const struct view_scene *v, uint32_t material, const double
 
 	memset(l, 0, bands * sizeof *l);
 	for (size_t i = 0; i < lights->n; i++) {
-		struct light_sight s;
+		struct light_sample s;
 		model_light_see(lights, i, x, ray_offset(v->rays), &s);
 		double cosine = v3_dot(n, s.toward), e = fabs(cosine) * s.across * s.falloff;
 		bsdf_eval_lobes(m, material, n, s.toward, out, f);

@@ -39,15 +39,15 @@ static int front(const struct facet *f, const struct facet *of, double near,
 	return 1;
 }
 
-static double brute(const struct model *m, struct brute *b, const struct occluder_set *bodies,
+static double brute(const struct model *m, struct brute *b, const struct occluder_set *occluders,
                     const double centre[3], const struct facet *f, const struct facet *g)
 {
 	struct facet_room room[2];
 	struct facet a, c;
 
-	if (!front(f, g, bodies->near, &room[0], &a) || !front(g, f, bodies->near, &room[1], &c))
+	if (!front(f, g, occluders->near, &room[0], &a) || !front(g, f, occluders->near, &room[1], &c))
 		return 0;
-	brute_begin(b, m, centre, &a, &c, bodies->near);
+	brute_begin(b, m, centre, &a, &c, occluders->near);
 	return brute_exchange(b, 1e-4 * fmin(f->area, g->area), 3);
 }
 
@@ -57,7 +57,7 @@ static void scene(uint64_t seed, int every, double tolerance)
 {
 	struct model m;
 	struct facet_set s;
-	struct occluder_set bodies;
+	struct occluder_set occluders;
 	struct err e = { 0 };
 	double centre[3];
 	struct exchanger x, y;
@@ -65,15 +65,15 @@ static void scene(uint64_t seed, int every, double tolerance)
 	                              .occluders = SHAFT_OCCLUDERS };
 
 	if (random_scene(&m, seed) || occ_facet_set_init(&s, &m, FACETS_OF_PATCHES, &e) ||
-	    occ_occluder_set_init(&bodies, &m, &e)) {
+	    occ_occluder_set_init(&occluders, &m, &e)) {
 		printf("seed %lu: %s\n", (unsigned long)seed, e.text);
 		return;
 	}
 	occ_facet_centre(&m, centre);
-	occ_exchanger_init(&x, &o, &bodies, NULL, centre);
+	occ_exchanger_init(&x, &o, &occluders, NULL, centre);
 	o.absolute = 1e-8;
 	o.most = 20000;
-	occ_exchanger_init(&y, &o, &bodies, NULL, centre);
+	occ_exchanger_init(&y, &o, &occluders, NULL, centre);
 	double begun = seconds(), worst_off = 0, fine_time = 0, brute_time = 0, main_time = 0;
 	int bad = 0, checked = 0;
 	double ratio = 0;
@@ -105,7 +105,7 @@ static void scene(uint64_t seed, int every, double tolerance)
 				continue;
 			checked++;
 			t = seconds();
-			double truth = brute(&m, &b, &bodies, centre, &s.facet[i], &s.facet[j]);
+			double truth = brute(&m, &b, &occluders, centre, &s.facet[i], &s.facet[j]);
 			brute_time += seconds() - t;
 			double err1 = fabs(a - truth) / least, err2 = fabs(fine - truth) / least;
 			if (suspect || err1 > 1e-5 + 4 * off / least) {
@@ -116,16 +116,16 @@ static void scene(uint64_t seed, int every, double tolerance)
 				       suspect ? " *" : "");
 			}
 		}
-	printf("seed %lu: %zu facets, %zu bodies, %.0f clear %.0f hidden %.0f partly, %.0f ev each, "
+	printf("seed %lu: %zu facets, %zu occluders, %.0f clear %.0f hidden %.0f partly, %.0f ev each, "
 	       "%d checked %d bad, worst 1e-6:1e-8 %.2g, %.2g of stated, %.1f s (%.1f fine %.1f brute %.1f)\n", (unsigned long)seed, s.facets,
-	       bodies.occluders, x.counts.unoccluded, x.counts.hidden, x.counts.partly,
+	       occluders.occluders, x.counts.unoccluded, x.counts.hidden, x.counts.partly,
 	       x.counts.evaluations / fmax(1, x.counts.partly), checked, bad, worst_off, ratio,
 	       seconds() - begun, main_time, fine_time, brute_time);
 	fflush(stdout);
 	occ_exchanger_free(&x);
 	occ_exchanger_free(&y);
 	occ_facet_set_free(&s);
-	occ_occluder_set_free(&bodies);
+	occ_occluder_set_free(&occluders);
 	model_free(&m);
 }
 
@@ -172,14 +172,14 @@ static void one(uint64_t seed, uint32_t i, uint32_t j)
 {
 	struct model m;
 	struct facet_set s;
-	struct occluder_set bodies;
+	struct occluder_set occluders;
 	struct err e = { 0 };
 	double centre[3], off, least;
 	struct shaft l;
 
 	random_scene(&m, seed);
 	occ_facet_set_init(&s, &m, FACETS_OF_PATCHES, &e);
-	occ_occluder_set_init(&bodies, &m, &e);
+	occ_occluder_set_init(&occluders, &m, &e);
 	occ_facet_centre(&m, centre);
 	const struct facet *f = &s.facet[i], *g = &s.facet[j];
 	least = fmin(f->area, g->area);
@@ -192,31 +192,31 @@ static void one(uint64_t seed, uint32_t i, uint32_t j)
 	}
 	struct facet_room room[2];
 	struct facet a, c;
-	front(f, g, bodies.near, &room[0], &a);
-	front(g, f, bodies.near, &room[1], &c);
-	printf("sight %d, bodies", (int)occ_shaft_cull(&l, &bodies, &a, &c));
+	front(f, g, occluders.near, &room[0], &a);
+	front(g, f, occluders.near, &room[1], &c);
+	printf("shaft %d, occluders", (int)occ_shaft_cull(&l, &occluders, &a, &c));
 	for (int k = 0; k < l.occluders; k++) {
-		const struct occluder_shape *o = &bodies.occluder[l.occluder[k]];
+		const struct occluder_shape *o = &occluders.occluder[l.occluder[k]];
 		printf("\n  %s, %u corners:", o->flat ? "flat" : "solid", o->corners);
 		for (uint32_t q = 0; q < o->corners; q++)
-			printf(" (%.6f %.6f %.6f)", bodies.corner[3 * (o->corner + q)], bodies.corner[3 * (o->corner + q) + 1], bodies.corner[3 * (o->corner + q) + 2]);
+			printf(" (%.6f %.6f %.6f)", occluders.corner[3 * (o->corner + q)], occluders.corner[3 * (o->corner + q) + 1], occluders.corner[3 * (o->corner + q) + 2]);
 	}
 	printf("\n");
 	for (double t = 1e-3; t > 5e-10; t /= 10) {
 		struct exchanger x;
 		struct exchange_options o = { .relative = 1e-9, .absolute = t, .most = 200000 };
-		occ_exchanger_init(&x, &o, &bodies, NULL, centre);
+		occ_exchanger_init(&x, &o, &occluders, NULL, centre);
 		double v = occ_exchange(&x, &s, i, &s, j, &off, &e), w = occ_exchange(&x, &s, j, &s, i, &off, &e);
 		printf("t %.0e: %.10g %.10g stated %.2g, %.0f evaluations\n", t, v / least, w / least, off / least, x.counts.evaluations);
 		occ_exchanger_free(&x);
 	}
-	brute_begin(&b, &m, centre, &a, &c, bodies.near);
+	brute_begin(&b, &m, centre, &a, &c, occluders.near);
 	for (double t = 1e-3; t > 5e-8; t /= 10) {
 		b.evaluations = 0;
 		double v = brute_exchange(&b, t * least, 3);
 		printf("brute %.0e: %.10g (%.0f ev)\n", t, v / least, b.evaluations);
 	}
-	brute_begin(&b, &m, centre, &c, &a, bodies.near);
+	brute_begin(&b, &m, centre, &c, &a, occluders.near);
 	printf("brute 1e-6: %.10g\n", brute_exchange(&b, 1e-6 * least, 3) / least);
 	struct dice d = { 1, 0 };
 	double sum = 0, sq = 0;

@@ -73,7 +73,7 @@ static double irradiance(const struct room *r, double x, double y)
 
 	ray_leave(r->rays, normal, from);
 	for (size_t i = 0; i < l->n; i++) {
-		struct light_sight s;
+		struct light_sample s;
 		double value = l->intensity[i];
 		model_light_see(l, i, at, ray_offset(r->rays), &s);
 		if (ray_light_visibility(&r->ways, i, from, &s, &value, &rays))

@@ -304,7 +304,7 @@ static void touch(const struct facet *f, double g[12])
 }
 
 /* The rule for two at once, where it says that it does, against products of 36 points each. */
-static void test_joint(void **state)
+static void test_fitted_pair(void **state)
 {
 	static const double tolerance[] = { 1e-5, 8e-7, 1e-9 };
 	struct dice d = { 17, 0 };
@@ -344,14 +344,14 @@ static void test_joint(void **state)
 }
 
 /* Four pairs at a time: as one by one, the same bits whichever facet of a pair is given. */
-static void test_joint_table(void **state)
+static void test_pair_table(void **state)
 {
 	enum { N = 40 };
 	const double tolerance = 8e-7, near = 1e-9;
 	struct dice d = { 19, 0 };
 	double v[N][12], one[PAIR_ONE], x[4], other[4], low, high;
 	struct facet f[N];
-	struct cubature_pair joint[N];
+	struct cubature_pair fitted[N];
 	struct cubature_pair_table t;
 	struct err e = { 0 };
 	int reached = 0, behind = 0;
@@ -365,9 +365,9 @@ static void test_joint_table(void **state)
 		for (int k = 0; i % 4 == 1 && k < 4; k++)
 			v[i][3 * k + 2] = 0; /* many in one plane */
 		f[i] = facet_of(i % 7 ? 4 : 3, v[i]);
-		geo_pair_fill(&f[i], &joint[i]);
+		geo_pair_fill(&f[i], &fitted[i]);
 	}
-	assert_int_equal(geo_pair_table_new(f, joint, N, tolerance, near, &t, &e), 0);
+	assert_int_equal(geo_pair_table_new(f, fitted, N, tolerance, near, &t, &e), 0);
 	for (size_t i = 0; i < N; i++)
 		for (size_t j = 0; j < N; j++) {
 			geo_pair_one(&t, i, one);
@@ -376,15 +376,15 @@ static void test_joint_table(void **state)
 			assert_int_equal(known, geo_pair_four(&t, one, i, 1, other) & 1);
 			int front = in_front(&f[i], &f[j]) && in_front(&f[j], &f[i]);
 			if (!known) {
-				assert_true(i == j || !front || !geo_pair_reaches(&f[i], &joint[i], &f[j],
-				                                                  &joint[j], .999 * tolerance) ||
+				assert_true(i == j || !front || !geo_pair_reaches(&f[i], &fitted[i], &f[j],
+				                                                  &fitted[j], .999 * tolerance) ||
 				            v3_dot(f[i].normal, f[j].centre) - f[i].offset < f[j].radius ||
 				            v3_dot(f[j].normal, f[i].centre) - f[j].offset < f[i].radius);
 				continue;
 			}
 			assert_that(x[0], ==, other[0]);
 			if (x[0] > 0) {
-				double exact = geo_pair_exchange(&f[i], &joint[i], &f[j], &joint[j]);
+				double exact = geo_pair_exchange(&f[i], &fitted[i], &f[j], &fitted[j]);
 				assert_true(front);
 				assert_near(x[0], exact, 1e-13 * exact);
 				reached++;
@@ -529,7 +529,7 @@ int main(void)
 		cmocka_unit_test(test_both_ways),
 		cmocka_unit_test(test_cubature_reach),
 		cmocka_unit_test(test_cubature_weights),
-		cmocka_unit_test(test_joint), cmocka_unit_test(test_joint_table),
+		cmocka_unit_test(test_fitted_pair), cmocka_unit_test(test_pair_table),
 		cmocka_unit_test(test_clear),
 		cmocka_unit_test(test_facet_parts),
 		cmocka_unit_test(test_facet_clip),

@@ -1,4 +1,4 @@
-/* Bodies, sights and partly hidden polygons: against hand-made scenes and brute force. */
+/* Occluders, shafts and partly hidden polygons: against hand-made scenes and brute force. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -13,7 +13,7 @@
 struct lab {
 	struct model m;
 	struct facet_set s;
-	struct occluder_set bodies;
+	struct occluder_set occluders;
 	double centre[3];
 	struct exchanger x;
 };
@@ -25,16 +25,16 @@ static void ready(struct lab *l, double absolute)
 	                              .occluders = SHAFT_OCCLUDERS };
 
 	assert_int_equal(occ_facet_set_init(&l->s, &l->m, FACETS_OF_PATCHES, &e), 0);
-	assert_int_equal(occ_occluder_set_init(&l->bodies, &l->m, &e), 0);
+	assert_int_equal(occ_occluder_set_init(&l->occluders, &l->m, &e), 0);
 	occ_facet_centre(&l->m, l->centre);
-	occ_exchanger_init(&l->x, &o, &l->bodies, NULL, l->centre);
+	occ_exchanger_init(&l->x, &o, &l->occluders, NULL, l->centre);
 }
 
 static void finish(struct lab *l)
 {
 	occ_exchanger_free(&l->x);
 	occ_facet_set_free(&l->s);
-	occ_occluder_set_free(&l->bodies);
+	occ_occluder_set_free(&l->occluders);
 	model_free(&l->m);
 }
 
@@ -47,7 +47,7 @@ static size_t flats(const struct occluder_set *s)
 	return n;
 }
 
-/* ---- bodies ---- */
+/* ---- occluders ---- */
 
 /* A wide room: nothing else is on the scene's hull. */
 static void far_room(struct model *m, int one_sided)
@@ -57,7 +57,7 @@ static void far_room(struct model *m, int one_sided)
 }
 
 /* Bodies of a scene of one block in a room: how many, and how many are flat. */
-static void check_block(int faces, int k, int one_sided, size_t bodies, size_t flat)
+static void check_block(int faces, int k, int one_sided, size_t occluders, size_t flat)
 {
 	struct lab l = { 0 };
 
@@ -65,12 +65,12 @@ static void check_block(int faces, int k, int one_sided, size_t bodies, size_t f
 	scene_block(&l.m, 0, 0, 0, 1, 2, 3, faces, k, 0);
 	assert_int_equal(scene_end(&l.m), 0);
 	ready(&l, 1e-6);
-	assert_int_equal(l.bodies.occluders, bodies);
-	assert_int_equal(flats(&l.bodies), flat);
-	if (bodies && !flat) {
-		assert_int_equal(l.bodies.occluder[0].corners, 8);
-		assert_int_equal(l.bodies.occluder[0].edges, 12);
-		assert_int_equal(l.bodies.occluder[0].faces, 6);
+	assert_int_equal(l.occluders.occluders, occluders);
+	assert_int_equal(flats(&l.occluders), flat);
+	if (occluders && !flat) {
+		assert_int_equal(l.occluders.occluder[0].corners, 8);
+		assert_int_equal(l.occluders.occluder[0].edges, 12);
+		assert_int_equal(l.occluders.occluder[0].faces, 6);
 	}
 	finish(&l);
 }
@@ -101,7 +101,7 @@ static void test_room(void **state)
 				scene_block(&l.m, 0, 0, 0, 1, 2, 3, faces, 3, inwards);
 				assert_int_equal(scene_end(&l.m), 0);
 				ready(&l, 1e-6);
-				assert_int_equal(l.bodies.occluders, 0);
+				assert_int_equal(l.occluders.occluders, 0);
 				finish(&l);
 			}
 }
@@ -127,13 +127,13 @@ static void test_not_convex(void **state)
 	scene_polygon(&l.m, 6, (const double (*)[3])v);
 	assert_int_equal(scene_end(&l.m), 0);
 	ready(&l, 1e-6);
-	for (size_t i = 0; i < l.bodies.occluders; i++) {
+	for (size_t i = 0; i < l.occluders.occluders; i++) {
 		given("i %zu", i);
-		const struct occluder_shape *b = &l.bodies.occluder[i];
+		const struct occluder_shape *b = &l.occluders.occluder[i];
 		/* No body holds the notch. */
 		int holds = !b->flat;
 		for (uint32_t f = 0; holds && f < b->faces; f++) {
-			const struct plane *p = &l.bodies.face[b->face + f];
+			const struct plane *p = &l.occluders.face[b->face + f];
 			const double notch[3] = { 1.5 - l.centre[0], 1.5 - l.centre[1], .5 - l.centre[2] };
 			holds = v3_dot(p->normal, notch) < p->offset;
 		}
@@ -211,7 +211,7 @@ static void test_inside(void **state)
 }
 
 /* A cone's front part has more edges than the cone; one of many sides stays its faces. */
-static void check_cone(int sides, size_t bodies, size_t flat)
+static void check_cone(int sides, size_t occluders, size_t flat)
 {
 	struct lab l = { 0 };
 	struct err e = { 0 };
@@ -233,8 +233,8 @@ static void check_cone(int sides, size_t bodies, size_t flat)
 	           (double[]){ 2, -2, -1 });
 	assert_int_equal(scene_end(&l.m), 0);
 	ready(&l, 1e-3);
-	assert_int_equal(l.bodies.occluders, bodies);
-	assert_int_equal(flats(&l.bodies), flat);
+	assert_int_equal(l.occluders.occluders, occluders);
+	assert_int_equal(flats(&l.occluders), flat);
 	uint32_t last = (uint32_t)l.s.facets - 1;
 	for (uint32_t i = 0; i < last; i++)
 		sum += occ_exchange(&l.x, &l.s, last, &l.s, i, &off, &e);
@@ -251,7 +251,7 @@ static void test_cone(void **state)
 	check_cone(31, 32, 32);
 }
 
-/* ---- sights ---- */
+/* ---- shafts ---- */
 
 /* Of two unit squares, past a beam between them from x = at. */
 static enum shaft_state look(int solid, double at, double side)
@@ -270,12 +270,12 @@ static enum shaft_state look(int solid, double at, double side)
 		scene_grid(&l.m, (double[]){ at, -.5, 1 }, (double[]){ side, 0, 0 }, (double[]){ 0, 2, 0 }, 1);
 	assert_int_equal(scene_end(&l.m), 0);
 	ready(&l, 1e-6);
-	enum shaft_state found = occ_shaft_cull(&s, &l.bodies, &l.s.facet[6], &l.s.facet[7]);
+	enum shaft_state found = occ_shaft_cull(&s, &l.occluders, &l.s.facet[6], &l.s.facet[7]);
 	finish(&l);
 	return found;
 }
 
-static void test_sight(void **state)
+static void test_shaft(void **state)
 {
 	(void)state;
 	for (int solid = 0; solid < 2; solid++) {
@@ -322,7 +322,7 @@ static void test_seen(void **state)
 		static struct visible_point seer;
 		assert_int_equal(random_scene(&l.m, seed), 0);
 		ready(&l, 1e-6);
-		const double near = l.bodies.near;
+		const double near = l.occluders.near;
 		for (int pair = 0; pair < 300; pair++) {
 			struct facet_room room[2];
 			struct facet f, g;
@@ -332,11 +332,11 @@ static void test_seen(void **state)
 			if (a == b || !in_front(a, b, near, &room[0], &f) ||
 			    !in_front(b, a, near, &room[1], &g))
 				continue;
-			enum shaft_state sight = occ_shaft_cull(&s, &l.bodies, &f, &g);
-			int blockers = 0;
-			for (int i = 0; sight == SHAFT_PARTLY && i < s.occluders; i++)
-				blockers += occ_occluder_make(&l.bodies, s.occluder[i], &g, &seer.occluder[blockers]);
-			occ_visible_begin(&seer, blockers, near);
+			enum shaft_state shaft = occ_shaft_cull(&s, &l.occluders, &f, &g);
+			int occluders = 0;
+			for (int i = 0; shaft == SHAFT_PARTLY && i < s.occluders; i++)
+				occluders += occ_occluder_make(&l.occluders, s.occluder[i], &g, &seer.occluder[occluders]);
+			occ_visible_begin(&seer, occluders, near);
 			brute_begin(&brute, &l.m, l.centre, &f, &g, near);
 			for (int k = 0; k < 4; k++) {
 				double x[3], u = sqrt(roll(&d, 0, 1)), w = roll(&d, 0, 1);
@@ -344,11 +344,11 @@ static void test_seen(void **state)
 				for (int i = 0; i < 3; i++)
 					x[i] = (1 - u) * f.v[i] + u * ((1 - w) * f.v[3 * c + i] + w * f.v[3 * c + 3 + i]);
 				double exact = brute_point(&brute, x), got = 0;
-				if (sight != SHAFT_HIDDEN)
-					got = occ_visible_exchange(&seer, x, f.normal, &g, blockers ? UINT64_MAX >> (64 - blockers) : 0, &e);
+				if (shaft != SHAFT_HIDDEN)
+					got = occ_visible_exchange(&seer, x, f.normal, &g, occluders ? UINT64_MAX >> (64 - occluders) : 0, &e);
 				if (!(fabs(got - exact) <= 2e-6))
-					fail_msg("seed %d, facets %d and %d: %.12g, brute %.12g (sight %d)", (int)seed,
-					         (int)(a - l.s.facet), (int)(b - l.s.facet), got, exact, (int)sight);
+					fail_msg("seed %d, facets %d and %d: %.12g, brute %.12g (shaft %d)", (int)seed,
+					         (int)(a - l.s.facet), (int)(b - l.s.facet), got, exact, (int)shaft);
 			}
 		}
 		finish(&l);
@@ -383,7 +383,7 @@ static void test_exchange(void **state)
 		ready(&l, 1e-6);
 		uint32_t a = l.s.start[2 * 6], b = l.s.start[2 * 7];
 		double got = occ_exchange(&l.x, &l.s, a, &l.s, b, &off, &e);
-		brute_begin(&brute, &l.m, l.centre, &l.s.facet[a], &l.s.facet[b], l.bodies.near);
+		brute_begin(&brute, &l.m, l.centre, &l.s.facet[a], &l.s.facet[b], l.occluders.near);
 		assert_near(got, brute_exchange(&brute, 1e-4, 3), 4e-6);
 		assert_that(off, <=, 1.2e-6);
 		double back = occ_exchange(&l.x, &l.s, b, &l.s, a, &off, &e);
@@ -402,7 +402,7 @@ int main(void)
 		cmocka_unit_test(test_t_junctions),
 		cmocka_unit_test(test_inside),
 		cmocka_unit_test(test_cone),
-		cmocka_unit_test(test_sight),
+		cmocka_unit_test(test_shaft),
 		cmocka_unit_test(test_seen),
 		slow_unit_test(test_exchange),
 	};
