@@ -246,7 +246,8 @@ static double put_straight(struct ff_thread *t, double rays)
 		if (t->job->is_black[ps])
 			ff_tally_rest(&t->tally, arrival[i].chain)->black += arrival[i].value * rays;
 		else
-			ff_tally_hit(&t->tally, arrival[i].chain, arrival[i].column, arrival[i].value * rays, back);
+			ff_tally_hit(&t->tally, arrival[i].chain, arrival[i].column,
+			             arrival[i].value * rays, back);
 	}
 	return first;
 }

@@ -454,7 +454,8 @@ int ff_combine_estimates(struct ff_thread *t, uint32_t ps, uint32_t cast, struct
 {
 	const struct ff_job *j = t->job;
 	int of_emitter = ff_row_is_of_emitter(j, ps);
-	double sum = of_emitter ? ff_emitter_row(t, ps, ff_row_rays(j, ps), &t->tally.err) : reciprocal_shares(t, ps);
+	double sum = of_emitter ? ff_emitter_row(t, ps, ff_row_rays(j, ps), &t->tally.err)
+	                        : reciprocal_shares(t, ps);
 	struct share_sum a = add_up(t, sum);
 	double rays, said = landing(t, ps, cast, &rays), lands = combine_landed(said, rays, &a);
 	double per_sample = a.sample / (of_emitter ? 1 : worth(j->reciprocal.rays));

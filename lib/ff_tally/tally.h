@@ -105,7 +105,8 @@ void ff_tally_replicate(struct tally *t);
  * cast, from which the raw residual follows. The standard error comes from the
  * replicates where there are two or more, otherwise it is that of `samples`
  * random samples; none (0) stands for exact values. The row says that it is worth `samples`,
- * or with t->dependent as many independent ones, if fewer, as have that error. O(hits + log). 0, or -1 and e. */
+ * or with t->dependent as many independent ones, if fewer, as have that error.
+ * O(hits + log). 0, or -1 and e. */
 int ff_tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
                     enum ff_row_kind kind, uint32_t samples, double total, struct err *e);
 
