@@ -214,7 +214,7 @@ static char *report_text(const struct job *j, struct err *e)
 	                      "patches", (json_int_t)j->m.patch.n,
 	                      "planar_patches", (json_int_t)r->planar_patches,
 	                      "largest_patch", (json_int_t)r->largest_patch,
-	                      "diagonal", r->diagonal,
+	                      "diameter", r->diameter,
 	                      "patch_size", length_json(r->patch_size),
 	                      "element_size", length_json(r->element_size),
 	                      "area_front", r->area_front, "area_back", r->area_back,
@@ -264,7 +264,7 @@ static void print_counts(FILE *f, const struct job *j)
 
 	fprintf(f, "scene       %zu surface%s, %zu light%s, %zu camera%s, %.6g m across\n",
 	        m->surface.n, plural(m->surface.n), m->light.n, plural(m->light.n), m->cameras,
-	        plural(m->cameras), r->diagonal);
+	        plural(m->cameras), r->diameter);
 	fprintf(f, "triangles   %zu", m->triangle.n);
 	if (r->total.degenerate)
 		fprintf(f, ", %u without area dropped", r->total.degenerate);

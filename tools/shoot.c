@@ -260,13 +260,11 @@ static int solve(struct job *j, struct err *e)
 	}
 	t1 = cli_seconds();
 	j->progress = cli_progress_begin(&bar, j->cli, "shooting");
-	int bad = radiosity_shoot(&j->s, &j->t, &j->r->solve, &hooks, &j->report, e);
+	int bad = radiosity_solve(&j->s, &j->t, &j->r->solve, &hooks, &j->report, e);
 	cli_progress_end(&bar);
 	if (bad)
 		return -1;
 	t2 = cli_seconds();
-	if (radiosity_element_irradiance(&j->s, &j->t, j->cli->threads, &j->report, e))
-		return -1;
 	t3 = cli_seconds();
 	if (interp_discretisation(&j->m, &j->s, j->cli->threads, e))
 		return -1;
@@ -280,7 +278,7 @@ static int solve(struct job *j, struct err *e)
 /* ---- the report ---- */
 
 static const char *const term_name[LEDGER_TERMS] = { "emitted", "absorbed", "escaped", "lost",
-                                                     "cut" };
+                                                     "cut", "uneven" };
 
 static json_t *number(double x)
 {
@@ -297,6 +295,29 @@ static double ledger_of(const struct solution *s, int term, int band)
 	return sum;
 }
 
+/* What was made up for, root mean square over area and bands, over the mean irradiance. */
+static double uneven_part(const struct job *j)
+{
+	const struct solution *s = &j->s;
+	size_t bands = (size_t)s->bands;
+	double square = 0, all = 0, area = 0;
+
+	for (size_t es = 0; es < s->element_sides; es++) {
+		double a = j->m.element.area[es >> 1];
+		if (!model_side_modelled(&j->m, 2 * j->m.element.patch[es >> 1] + (uint32_t)(es & 1)))
+			continue;
+		for (size_t k = 0; k < bands; k++) {
+			double u = 0;
+			for (size_t g = 0; g < s->groups; g++)
+				u += (double)s->uneven[(g * s->element_sides + es) * bands + k];
+			square += a * u * u;
+			all += a * solution_irradiance(s, es, (int)k);
+			area += a;
+		}
+	}
+	return all > 0 ? sqrt(square * area) / all : 0;
+}
+
 static char *report_text(const struct job *j)
 {
 	const struct radiosity_report *r = &j->report;
@@ -309,12 +330,14 @@ static char *report_text(const struct job *j)
 			json_array_append_new(band, json_real(ledger_of(&j->s, term, k)));
 		json_object_set_new(ledger, term_name[term], band);
 	}
-	o = json_pack("{s:o, s:f, s:I, s:i, s:f, s:o, s:f, s:o, s:f, s:f, s:f}", "ledger", ledger,
+	o = json_pack("{s:o, s:f, s:I, s:i, s:f, s:o, s:f, s:o, s:f, s:f, s:f, s:f, s:f}", "ledger", ledger,
 	              "passes", r->passes, "shots", (json_int_t)j->s.shots, "components", r->components,
 	              "unshot", r->unshot, "truncation_bound", number(r->bound),
 	              "guessed_directions", r->guessed, "ledger_residual", number(r->residual),
 	              "mean_error", solution_mean_error(&j->m, &j->s),
 	              "sampling", solution_relative_rms(&j->m, &j->s, j->s.error.sampling),
+	              "uneven", uneven_part(j),
+	              "uneven_left", solution_relative_rms(&j->m, &j->s, j->s.error.uneven),
 	              "discretisation", solution_relative_rms(&j->m, &j->s, j->s.error.discretisation));
 	text = json_dumps(o, JSON_COMPACT);
 	json_decref(o);
@@ -356,6 +379,8 @@ static void print_report(const struct job *j)
 	fprintf(out, "sampling      %.3g relative standard error of irradiance, mean over area; "
 	        "%.3g rms\n", solution_mean_error(&j->m, s),
 	        solution_relative_rms(&j->m, s, s->error.sampling));
+	fprintf(out, "uneven        %.3g of irradiance made up for patches that are not evenly lit; "
+	        "%.3g left (estimate), rms\n", uneven_part(j), solution_relative_rms(&j->m, s, s->error.uneven));
 	fprintf(out, "elements      %.3g relative error of irradiance between elements "
 	        "(estimate), rms over area\n",
 	        solution_relative_rms(&j->m, s, s->error.discretisation));

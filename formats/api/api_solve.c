@@ -27,8 +27,7 @@ static int solve(const struct twopass_scene *s, const struct twopass_solve_optio
 	int bad = api_within("stop", o.stop, 0, 1, e) ||
 	          radiosity_transport_init(&t, &s->m, &ff, &name, 1, o.threads, e) ||
 	          radiosity_begin(out, &s->m, &t, 0, e) ||
-	          radiosity_shoot(out, &t, &o, &hooks, &report, e) ||
-	          radiosity_element_irradiance(out, &t, o.threads, &report, e) ||
+	          radiosity_solve(out, &t, &o, &hooks, &report, e) ||
 	          interp_discretisation(&s->m, out, o.threads, e);
 	radiosity_transport_free(&t);
 	return bad ? -1 : 0;

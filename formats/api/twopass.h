@@ -36,7 +36,7 @@ const char *twopass_version(void);
 
 /* ---- meshes ---- */
 
-/* Metres, or if relative a fraction of the diagonal of the scene's bounding box; INFINITY
+/* Metres, or if relative a fraction of the diameter of the smallest ball about the scene; INFINITY
  * is no bound. */
 struct twopass_length {
 	double value;

@@ -42,7 +42,9 @@ static int get_counts(const struct container *c, struct ff *f, struct err *e)
 	    file_fields_size(c, "column", column_type(c), 1, 0, &f->columns, e) ||
 	    file_fields_size(c, "value", value_type(c), 1, 0, &f->entries, e) ||
 	    size_if_any(c, "arrival_target", &f->arrival.n, e) ||
-	    size_if_any(c, "link_target", &f->link.n, e))
+	    size_if_any(c, "link_target", &f->link.n, e) ||
+	    size_if_any(c, "gathered_rays", &f->gathered.sides, e) ||
+	    size_if_any(c, "gathered_landing", &f->gathered.n, e))
 		return -1;
 	if (f->chain.n == 0)
 		return file_container_refuse(c, e, "array chain_start: it is empty");
@@ -54,6 +56,9 @@ static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
                       uint32_t **most, struct array *made, struct err *e)
 {
 	const int f64 = value_type(c) == DT_F64, narrow = column_type(c) == DT_U16;
+	const int chains = file_container_find(c, "gathered_chain") != NULL;
+	struct ff_gathered *g = &f->gathered;
+	uint32_t *chain = NULL;
 	const struct field_or_not field[] = {
 		{ { &f->chain.start, "chain_start", DT_U64, 1, { f->chain.n + 1 } }, FIELD_NEVER },
 		{ { &f->chain.event, "chain_event", DT_U32, 1, { f->chain.events } }, FIELD_EMPTY },
@@ -82,6 +87,11 @@ static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
 		{ { &f->link.chain, "link_chain", DT_U32, 1, { f->link.n } }, FIELD_EMPTY },
 		{ { &f->link.direction, "link_direction", DT_F32, 2, { f->link.n, 3 } }, FIELD_EMPTY },
 		{ { &f->link.row, "link_row", DT_U32, 2, { f->link.n, 2 } }, FIELD_EMPTY },
+		{ { &g->rays, "gathered_rays", DT_U32, 1, { g->sides } }, FIELD_EMPTY },
+		{ { &g->lost, "gathered_lost", DT_U32, 1, { g->sides } }, FIELD_EMPTY },
+		{ { &g->count, "gathered_count", DT_U32, 1, { g->sides } }, FIELD_EMPTY },
+		{ { &g->landing, "gathered_landing", DT_U32, 1, { g->n } }, FIELD_EMPTY },
+		{ { &chain, "gathered_chain", DT_U32, 1, { chains ? g->n : 0 } }, FIELD_EMPTY },
 		{ { part, "part", DT_U32, 1, { 4 } }, FIELD_NEVER },
 		{ { most, "chain_most", DT_U32, 1, { 1 } }, FIELD_ZEROS },
 		{ { narrow ? (void *)&f->column16 : (void *)&f->column, "column",
@@ -90,7 +100,10 @@ static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
 		  f64 ? DT_F64 : DT_F32, 1, { f->entries } }, FIELD_NEVER },
 	};
 
-	return file_fields_map_or_make(c, field, sizeof field / sizeof *field, made, e);
+	if (file_fields_map_or_make(c, field, sizeof field / sizeof *field, made, e))
+		return -1;
+	g->chain = chains ? chain : NULL;
+	return 0;
 }
 
 static int get_receivers(const struct container *c, struct ff *f, struct err *e)

@@ -15,7 +15,7 @@ enum grown {
 	ROW_SCALE, ROW_BLOCK, BLOCK_START, BLOCK_COLUMN, BLOCK_ESCAPE, BLOCK_BLACK, BLOCK_LOST,
 	BLOCK_CUT, BLOCK_ARRIVAL, ROW_RESIDUAL, ROW_ERROR, ROW_SIDE, ROW_SAMPLES, BLOCK_CHAIN, COLUMN, VALUE,
 	ARRIVAL_TARGET, ARRIVAL_DIRECTION, LINK_TARGET, LINK_SOURCE, LINK_LAST, LINK_CHAIN, LINK_DIRECTION,
-	LINK_ROW, ROW_KIND, GROWN
+	LINK_ROW, ROW_KIND, GATHERED_RAYS, GATHERED_LOST, GATHERED_COUNT, GATHERED_LANDING, GATHERED_CHAIN, GROWN
 };
 
 static const struct {
@@ -49,6 +49,11 @@ static const struct {
 	[LINK_DIRECTION] = { "link_direction", DT_F32, FIELD_EMPTY, 3 },
 	[LINK_ROW] = { "link_row", DT_U32, FIELD_EMPTY, 2 },
 	[ROW_KIND] = { "row_kind", DT_U8, FIELD_ZEROS, 1 },
+	[GATHERED_RAYS] = { "gathered_rays", DT_U32, FIELD_EMPTY, 1 },
+	[GATHERED_LOST] = { "gathered_lost", DT_U32, FIELD_EMPTY, 1 },
+	[GATHERED_COUNT] = { "gathered_count", DT_U32, FIELD_EMPTY, 1 },
+	[GATHERED_LANDING] = { "gathered_landing", DT_U32, FIELD_EMPTY, 1 },
+	[GATHERED_CHAIN] = { "gathered_chain", DT_U32, FIELD_EMPTY, 1 },
 };
 
 struct ff_writer {
@@ -271,6 +276,15 @@ static int put_rows_and_blocks(struct ff_writer *w, const struct ff *b, struct e
 	       put_starts(w, BLOCK_ARRIVAL, b->block.arrival, b->block.n, w->arrivals, e) ? -1 : 0;
 }
 
+static int put_gathered(struct ff_writer *w, const struct ff_gathered *g, struct err *e)
+{
+	return put(w, GATHERED_RAYS, g->rays, g->sides, sizeof *g->rays, e) ||
+	       put(w, GATHERED_LOST, g->lost, g->sides, sizeof *g->lost, e) ||
+	       put(w, GATHERED_COUNT, g->count, g->sides, sizeof *g->count, e) ||
+	       put(w, GATHERED_LANDING, g->landing, g->n, sizeof *g->landing, e) ||
+	       (g->chain && put(w, GATHERED_CHAIN, g->chain, g->n, sizeof *g->chain, e)) ? -1 : 0;
+}
+
 static int put_words(struct ff_writer *w, const struct array *word, struct err *e)
 {
 	const uint32_t *from = word->data;
@@ -312,7 +326,8 @@ int file_ff_append(struct ff_writer *w, const struct ff *batch, struct err *e)
 		return err_set(e, "%s: more than 2^32 rows; compute it in parts",
 		               file_container_writer_path(w->container));
 	if (put_rows_and_blocks(w, batch, e) || put_columns(w, batch, e) ||
-	    put_values(w, batch, e) || put_link_rows(w, batch, e))
+	    put_values(w, batch, e) || put_link_rows(w, batch, e) ||
+	    (!w->to_patches && put_gathered(w, &batch->gathered, e)))
 		return -1;
 	w->rows += batch->row.n;
 	w->blocks += batch->block.n;

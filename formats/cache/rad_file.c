@@ -8,7 +8,7 @@
 
 #define FORMAT "twopass.rad"
 
-enum { FIELDS_MAX = 16 }; /* room for the list of fields below */
+enum { FIELDS_MAX = 17 }; /* room for the list of fields below */
 
 /* What is a plain member of the struct and an array in the file. */
 struct plain {
@@ -30,6 +30,8 @@ static size_t solution_fields(struct solution *s, struct plain *plain,
 		{ &s->error.discretisation_direct, "irradiance_discretisation_direct", DT_F64, 2,
 		  { sides, b } },
 		{ &s->error.discretisation, "irradiance_discretisation", DT_F64, 2, { sides, b } },
+		{ &s->error.uneven, "irradiance_error_uneven", DT_F64, 2, { sides, b } },
+		{ &s->uneven, "irradiance_uneven", DT_F32, 3, { g, sides, b } },
 		{ &s->unshot.emission, "unshot_emission", DT_F64, 2, { s->sources, b } },
 		{ &s->unshot.diffuse, "unshot_diffuse", DT_F64, 3, { s->patch_sides, g, b } },
 		{ &s->unshot.link, "unshot_link", DT_F64, 4, { s->links, 2, g, b } },

@@ -9,6 +9,7 @@ void ff_free(struct ff *f)
 	         f->block.chain, f->block.start, f->block.escape, f->block.black, f->block.lost,
 	         f->block.cut, f->block.arrival, f->block.column, f->column, f->column16,
 	         f->value, f->value64, f->arrival.target, f->arrival.direction, f->link.target,
-	         f->link.source, f->link.last, f->link.chain, f->link.direction, f->link.row);
+	         f->link.source, f->link.last, f->link.chain, f->link.direction, f->link.row,
+	         f->gathered.rays, f->gathered.lost, f->gathered.count, f->gathered.landing, f->gathered.chain);
 	*f = (struct ff){ 0 };
 }

@@ -22,7 +22,10 @@
  * emitter by itself, other sources in runs of neighbours that look alike from the
  * target) and the chain it came by. Its rows are the directional form factors G of
  * eq. (3) of the paper for light from that source: one about R, one about T. Links
- * with source FF_ANY stand for a direction bin and serve sources without their own. */
+ * with source FF_ANY stand for a direction bin and serve sources without their own.
+ *
+ * GATHERED is where rays of element-sides landed. Rows take a patch-side for evenly lit;
+ * a solution is put right by these, which know of elements. */
 #ifndef TWOPASS_FF_H
 #define TWOPASS_FF_H
 
@@ -96,6 +99,19 @@ struct ff_links {
 	uint32_t *row;            /* [n][2] rows about R and T, or FF_NO_ROW */
 };
 
+/* Landings of the rays that the element-sides of the shard's patches cast, by patch-side, then
+ * element: where light comes from that arrives there directly (chain 0), or by directional events. Each stands for
+ * a part 1 / rays of what arrives; rays that meet nothing, or black sides, have none. */
+struct ff_gathered {
+	size_t sides;             /* 2 elements of the shard, or 0: nothing was gathered */
+	uint32_t *rays;           /* [sides] that it cast; 0: none */
+	uint32_t *lost;           /* [sides] of these, met nothing or black sides */
+	uint32_t *count;          /* [sides] landings */
+	size_t n;
+	uint32_t *landing;        /* [n] landing.h */
+	uint32_t *chain;          /* [n] as light passes it; NULL: all 0 */
+};
+
 struct ff {
 	struct ff_chains chain;
 	struct ff_rows row;
@@ -114,6 +130,7 @@ struct ff {
 
 	struct ff_arrivals arrival;
 	struct ff_links link;
+	struct ff_gathered gathered;
 
 	/* The shard: patches [patch_begin, patch_end), and as large a part of the lights,
 	 * leave through these rows. */

@@ -6,6 +6,7 @@
 
 #include "lib/base/index_check.h"
 #include "lib/base/mem.h"
+#include "lib/data/landing.h"
 
 /* Part of a row's flux by which stored rows may fail to close: a guess, far above the rounding of
  * sums in float64 and far below the error of any sampling. */
@@ -356,6 +357,34 @@ static int check_links(const struct ff *f, const struct ff_scene *s, struct err 
 	return 0;
 }
 
+/* ---- what was gathered ---- */
+
+static int check_gathered(const struct ff *f, const struct ff_scene *s, struct err *e)
+{
+	const struct ff_gathered *g = &f->gathered;
+	size_t elements = s->patch_start[f->patch_end] - s->patch_start[f->patch_begin];
+	uint64_t landings = 0;
+
+	if (g->sides && g->sides != 2 * elements)
+		return err_set(e, "array gathered_rays: %zu values for the %zu element-sides of this "
+		               "part", g->sides, 2 * elements);
+	for (size_t i = 0; i < g->sides; i++) {
+		if (g->count[i] && !g->rays[i])
+			return err_set(e, "array gathered_count: value %zu is %" PRIu32 " of 0 rays", i,
+			               g->count[i]);
+		if (g->lost[i] > g->rays[i])
+			return err_set(e, "array gathered_lost: value %zu is %" PRIu32 " of %" PRIu32
+			               " rays", i, g->lost[i], g->rays[i]);
+		landings += g->count[i];
+	}
+	if (landings != g->n)
+		return err_set(e, "array gathered_count: its sum is %" PRIu64 " of %zu landings",
+		               landings, g->n);
+	return err_check_below("gathered_landing", g->landing, g->n,
+	                       2 * (uint64_t)LANDING_PLACES * s->elements, e) ||
+	       (g->chain && err_check_below("gathered_chain", g->chain, g->n, f->chain.n, e)) ? -1 : 0;
+}
+
 static int check_part(const struct ff *f, size_t patches, struct err *e)
 {
 	if (f->patch_begin > f->patch_end || f->patch_end > patches)
@@ -374,5 +403,5 @@ int ff_check(const struct ff *f, const struct ff_scene *s, struct err *e)
 	       err_check_below("arrival_target", f->arrival.target, f->arrival.n,
 	                       2 * s->patches, e) ||
 	       unit_vectors("arrival_direction", f->arrival.direction, f->arrival.n, e) ||
-	       check_links(f, s, e) ? -1 : 0;
+	       check_links(f, s, e) || check_gathered(f, s, e) ? -1 : 0;
 }

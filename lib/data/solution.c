@@ -65,15 +65,16 @@ int solution_check(const struct model *m, const struct solution *s, struct err *
 	const struct numbers array[] = {
 		{ "irradiance_direct", s->irradiance.direct, s->groups * sides, 0 },
 		{ "irradiance_caustic", s->irradiance.caustic, s->groups * sides, 0 },
-		{ "irradiance_indirect", s->irradiance.indirect, s->groups * sides, 0 },
+		{ "irradiance_indirect", s->irradiance.indirect, s->groups * sides, 1 },
 		{ "irradiance_error", s->error.sampling, sides, 0 },
 		{ "irradiance_error_direct", s->error.sampling_direct, sides, 0 },
 		{ "irradiance_discretisation_direct", s->error.discretisation_direct, sides, 0 },
 		{ "irradiance_discretisation", s->error.discretisation, sides, 0 },
+		{ "irradiance_error_uneven", s->error.uneven, sides, 0 },
 		{ "unshot_emission", s->unshot.emission, s->sources * bands, 1 },
 		{ "unshot_diffuse", s->unshot.diffuse, s->patch_sides * channels, 1 },
 		{ "unshot_link", s->unshot.link, 2 * s->links * channels, 1 },
-		{ "shot", s->shot, 2 * s->rows * channels, 0 },
+		{ "shot", s->shot, 2 * s->rows * channels, 1 },
 		{ "round", s->round, ROUND_TERMS, 0 },
 		{ "ledger", s->ledger, LEDGER_TERMS * channels, 1 },
 	};
@@ -123,7 +124,8 @@ void solution_free(struct solution *s)
 		free(s->group_name[g]);
 	MEM_FREE(s->group_name, s->emitter_group, s->irradiance.direct, s->irradiance.caustic,
 	         s->irradiance.indirect, s->error.sampling, s->error.sampling_direct,
-	         s->error.discretisation, s->error.discretisation_direct, s->unshot.emission,
+	         s->error.discretisation, s->error.discretisation_direct, s->error.uneven,
+	         s->uneven, s->unshot.emission,
 	         s->unshot.diffuse, s->unshot.link, s->shot, s->ledger);
 	*s = (struct solution){ 0 };
 }

@@ -16,7 +16,7 @@ enum { ROUND_LEAST, ROUND_NEXT, ROUND_WORK, ROUND_UNSHOT, ROUND_TERMS };
 struct irradiance {
 	double *direct;            /* straight from emitters */
 	double *caustic;           /* from emitters by directional or ideal events only */
-	double *indirect;          /* the rest */
+	double *indirect;          /* the rest; below 0 where noise is more than there is */
 };
 
 /* What the sum of the three may be off by. [2E][bands] */
@@ -26,6 +26,7 @@ struct irradiance_error {
 	double *discretisation;    /* estimated root mean square, over the element, of what
 	                              interpolation misses */
 	double *discretisation_direct; /* the same of light straight from emitters */
+	double *uneven;            /* estimate of what is left of patches not being evenly lit */
 };
 
 /* Flux still to be shot. */
@@ -47,6 +48,8 @@ struct solution {
 	size_t element_sides;      /* 2 E */
 	int bands;
 	struct irradiance irradiance; /* [groups][2E][bands] */
+	float *uneven;             /* [groups][2E][bands] what of irradiance.indirect makes up for
+	                              patches that are not evenly lit */
 	struct irradiance_error error;
 
 	/* The state of shooting, for shoot --resume: what is still to be shot, what each
@@ -63,7 +66,7 @@ struct solution {
 };
 
 enum { LEDGER_EMITTED, LEDGER_ABSORBED, LEDGER_ESCAPED, LEDGER_LOST, LEDGER_CUT,
-       LEDGER_TERMS };
+       LEDGER_UNEVEN, LEDGER_TERMS };
 
 /* Group of what a source emits. */
 static inline uint32_t solution_group(const struct solution *s, const struct model *m,
@@ -95,7 +98,7 @@ static inline double solution_irradiance(const struct solution *s, size_t elemen
 double solution_exitance(const struct model *m, const struct solution *s,
                          size_t element_side, int band);
 
-/* Sizes that fit the model, finite values, irradiances and errors >= 0. 0, or -1
+/* Sizes that fit the model, finite values, errors >= 0. 0, or -1
  * and e with "array NAME: what is wrong". O(element sides x bands). */
 int solution_check(const struct model *m, const struct solution *s, struct err *e);
 

@@ -6,6 +6,7 @@
 #include "lib/ff/exchange_matrix.h"
 #include "lib/ff/ff_job.h"
 #include "lib/ff/ff_stats.h"
+#include "lib/ff/landings.h"
 #include "lib/ff/row_hemicube.h"
 #include "lib/ff/row_light.h"
 #include "lib/ff/row_rays.h"
@@ -19,6 +20,7 @@ enum { PATCHES_AT_A_TIME = 64 };
 
 struct run {
 	const struct ff_job *job;
+	struct ff_landings *landings;
 	struct ff_thread *thread;
 	struct ff_batch *batch;   /* [PATCHES_AT_A_TIME] */
 	int *owner;               /* thread that made each batch */
@@ -53,7 +55,9 @@ static int emit(struct run *r, size_t n, struct chains *whole, struct ff_stats *
 		struct ff_batch *b = &r->batch[i];
 		if (!bad && r->err[i].set)
 			bad = err_set(e, "%s", r->err[i].text);
-		if (!bad && b->row_side.n) {
+		if (!bad && r->first + i < r->job->m->patch.n && r->landings->patch)
+			bad = ff_landings_put(r->landings, r->first + (uint32_t)i, b, whole, e);
+		if (!bad && (b->row_side.n || b->gathered_rays.n)) {
 			bad = ff_batch_renumber(b, &t->tally.chains, &t->chain_map, whole, e);
 			struct ff f = ff_batch_view(b);
 			if (!bad)
@@ -80,15 +84,15 @@ static void report(void *arg, double done, double total)
 }
 
 /* Before the rows, all elements gather. */
-static int gather(struct ff_job *j, struct ff_stats *stats, const struct progress *progress,
-                  struct err *e)
+static int gather(struct ff_job *j, const struct ff *whole, struct ff_stats *stats,
+                  const struct progress *progress, struct err *e)
 {
 	struct part_progress pp = { progress, 0, 2. * (double)j->m->patch.n };
 	struct progress inner = { report, &pp };
 
 	if (!j->o.gather || j->o.method == FF_HEMICUBE)
 		return 0;
-	return ff_reciprocal_cast(j, &stats->rays, &inner, e) ||
+	return ff_reciprocal_cast(j, whole->patch_begin, whole->patch_end, &stats->rays, &inner, e) ||
 	       (j->reciprocal.rays && ff_share_rays(j, e)) ? -1 : 0;
 }
 
@@ -174,7 +178,7 @@ static int build_rows(struct ff_job *j, int patches, struct ff *whole, struct ff
 {
 	int threads = j->o.threads > 0 ? j->o.threads : 1;
 	struct chains chains = { 0 };
-	struct run run = { .job = j };
+	struct run run = { .job = j, .landings = &j->landings };
 	int bad = ff_job_prepare(j, patches, e) || bsdf_chains_init(&chains, j->m, j->chain_most, e);
 
 	run.thread = mem_new((size_t)threads, sizeof *run.thread, "threads", e);
@@ -187,7 +191,7 @@ static int build_rows(struct ff_job *j, int patches, struct ff *whole, struct ff
 	for (size_t i = 0; !bad && i < PATCHES_AT_A_TIME; i++)
 		run.batch[i].f64 = j->o.f64;
 	if (patches)
-		bad = bad || gather(j, stats, progress, e) ||
+		bad = bad || gather(j, whole, stats, progress, e) ||
 		      all_patches(&run, whole->patch_begin, whole->patch_end, &chains, stats, sink,
 		                  progress, e);
 	bad = bad || all_lights(&run, &chains, stats, sink, e) || put_chains(whole, &chains, e);

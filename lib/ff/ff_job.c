@@ -3,6 +3,7 @@
 
 #include <stdlib.h>
 
+#include "lib/ff/landings.h"
 #include "lib/ff/row_reciprocal.h"
 #include "lib/ff_rays/chain_limit.h"
 #include "lib/ff_rays/ray_samples.h"
@@ -121,6 +122,7 @@ void ff_job_free(struct ff_job *j)
 	ray_locator_free(&j->locator);
 	ff_tally_places_free(&j->places);
 	ff_reciprocal_free(&j->reciprocal);
+	ff_landings_free(&j->landings);
 	ff_formula_free(&j->formula);
 	ray_scene_free(j->rays);
 	ff_hemicube_scene_free(j->cubes);

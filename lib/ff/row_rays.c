@@ -44,10 +44,18 @@ static struct ff_weight diffuse(struct ff_thread *t, uint32_t ps)
 		return w;
 	t->capturing = j->has_lobe[ps];
 	t->capture_weight = 1;
-	ff_cast_side(t, ps, rays, -1, 0);
+	t->boost = 1;
+	if (j->emits[ps] && j->has_ideal && !j->has_lobe[ps]) {
+		struct ff_guide guide;
+		ff_guide_learn(t, ps, rays, &guide);
+		t->boost = guide.boost;
+		w.total = ff_cast_guided(t, ps, rays, &guide);
+	} else {
+		ff_cast_side(t, ps, rays, -1, 0);
+	}
 	t->capturing = 0;
 	if (gathered && !alone)
-		ff_combine_estimates(t, ps, rays, &w);
+		ff_combine_estimates(t, ps, (uint32_t)w.total, &w);
 	return w;
 }
 

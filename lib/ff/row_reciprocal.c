@@ -11,6 +11,7 @@
 
 #include "lib/base/mem.h"
 #include "lib/base/vec.h"
+#include "lib/ff/landings.h"
 #include "lib/ff/row_emitter.h"
 #include "lib/ff_rays/ray_budget.h"
 #include "lib/ff_rays/ray_samples.h"
@@ -51,6 +52,9 @@ struct gatherer {
 	struct array *met;         /* [threads] uint32_t: patch-sides hit by it */
 	struct array *pairs;       /* [patches] struct pair, by place */
 	uint32_t *pairs_of;          /* [2E] pairs of an element-side, by place */
+	struct ff_landings *landings; /* of patches [begin, end) */
+	uint32_t begin, end;
+	double *rays;              /* [threads] cast */
 	struct err *err;           /* [threads] */
 };
 
@@ -58,8 +62,9 @@ struct pair {
 	uint32_t source, count;
 };
 
-/* The rays of an element-side; how many escape, how many meet black sides. */
-static void cast(struct gatherer *g, uint32_t column, int thread, uint32_t lost[2])
+/* The rays of an element-side; how many escape, how many meet black sides. land: it is kept
+ * where they land. */
+static void cast(struct gatherer *g, uint32_t column, int land, int thread, uint32_t lost[2])
 {
 	const struct ff_job *j = g->job;
 	uint64_t seed = rng_mix(rng_mix(j->o.seed + 1) ^ rng_mix(~(uint64_t)column));
@@ -81,11 +86,15 @@ static void cast(struct gatherer *g, uint32_t column, int thread, uint32_t lost[
 			lost[1] += j->is_black[ps];
 			if (j->shoots_diffuse[ps] && hits[ps]++ == 0)
 				mem_append(&g->met[thread], &ps, 1, sizeof ps, &g->err[thread]);
+			if (land)
+				g->rays[thread] += ff_landings_add(g->landings, column, &b, i, thread,
+				                                   &g->err[thread]);
 		}
 	}
 }
 
-static void gather_element(struct gatherer *g, uint32_t patch, uint32_t column, int thread)
+static void gather_element(struct gatherer *g, uint32_t patch, uint32_t column, int land,
+                           int thread)
 {
 	struct array *met = &g->met[thread];
 	uint32_t lost[2] = { 0 }, ps = 2 * patch + (column & 1);
@@ -93,15 +102,22 @@ static void gather_element(struct gatherer *g, uint32_t patch, uint32_t column, 
 	              (g->job->m->patch.area[patch] * ff_reciprocal_rays(g->job, column >> 1));
 
 	met->n = 0;
-	cast(g, column, thread, lost);
+	if (land)
+		ff_landings_begin(g->landings, column, ff_reciprocal_rays(g->job, column >> 1), thread);
+	cast(g, column, land, thread, lost);
+	if (land)
+		ff_landings_end(g->landings, column, lost[0] + lost[1]);
+	g->rays[thread] += ff_reciprocal_rays(g->job, column >> 1);
 	g->to->escape[ps] += part * lost[0];
 	g->to->black[ps] += part * lost[1];
-	g->pairs_of[g->job->places.place[column] & ~TALLY_APART] = (uint32_t)met->n;
+	if (!g->job->is_ideal[ps])
+		g->pairs_of[g->job->places.place[column] & ~TALLY_APART] = (uint32_t)met->n;
 	for (size_t i = 0; i < met->n; i++) {
 		uint32_t source = ((uint32_t *)met->data)[i];
 		struct pair p = { source, g->hits[thread][source] };
 		g->hits[thread][source] = 0;
-		mem_append(&g->pairs[patch], &p, 1, sizeof p, &g->err[thread]);
+		if (!g->job->is_ideal[ps])
+			mem_append(&g->pairs[patch], &p, 1, sizeof p, &g->err[thread]);
 	}
 }
 
@@ -111,10 +127,11 @@ static void gather_patches(void *arg, size_t begin, size_t end, int thread)
 	const struct ff_job *j = g->job;
 
 	for (uint32_t ps = 2 * (uint32_t)begin; ps < 2 * end; ps++) {
-		if (j->is_black[ps] || j->is_ideal[ps])
+		int land = ps >> 1 >= g->begin && ps >> 1 < g->end;
+		if (j->is_black[ps] || (j->is_ideal[ps] && !land))
 			continue;
 		for (uint32_t el = j->m->patch.start[ps >> 1]; el < j->m->patch.start[(ps >> 1) + 1]; el++)
-			gather_element(g, ps >> 1, 2 * el + (ps & 1), thread);
+			gather_element(g, ps >> 1, 2 * el + (ps & 1), land, thread);
 	}
 }
 
@@ -191,6 +208,7 @@ static int allocate(struct gatherer *g, size_t threads, struct err *e)
 	g->hits = mem_new(threads, sizeof *g->hits, "gathering", e);
 	g->met = mem_new(threads, sizeof *g->met, "gathering", e);
 	g->err = mem_new(threads, sizeof *g->err, "gathering", e);
+	g->rays = mem_new(threads, sizeof *g->rays, "gathering", e);
 	g->pairs = mem_new(patches, sizeof *g->pairs, "gathering", e);
 	g->pairs_of = mem_new(2 * g->job->m->element.n, sizeof *g->pairs_of, "gathering", e);
 	to->start = mem_new(sides + 1, sizeof *to->start, "gathered light", e);
@@ -199,7 +217,7 @@ static int allocate(struct gatherer *g, size_t threads, struct err *e)
 	to->black = mem_new(sides, sizeof *to->black, "gathered light", e);
 	for (size_t t = 0; g->hits && t < threads; t++)
 		good &= (g->hits[t] = mem_new(sides, sizeof **g->hits, "gathering", e)) != NULL;
-	return good && g->hits && g->met && g->err && g->pairs && g->pairs_of && to->start &&
+	return good && g->hits && g->met && g->err && g->rays && g->pairs && g->pairs_of && to->start &&
 	       to->centre && to->escape && to->black ? 0 : -1;
 }
 
@@ -216,6 +234,7 @@ static void release(struct gatherer *g, size_t threads)
 	free(g->hits);
 	free(g->met);
 	free(g->err);
+	free(g->rays);
 	free(g->pairs);
 	free(g->pairs_of);
 }
@@ -252,30 +271,30 @@ static double patch_rays(const struct ff_job *j, uint32_t patch)
 	return n;
 }
 
-int ff_reciprocal_cast(struct ff_job *j, double *rays, const struct progress *progress, struct err *e)
+int ff_reciprocal_cast(struct ff_job *j, uint32_t begin, uint32_t end, double *rays,
+                       const struct progress *progress, struct err *e)
 {
 	size_t threads = j->o.threads > 0 ? (size_t)j->o.threads : 1;
-	struct gatherer g = { .job = j, .to = &j->reciprocal };
-	int bad;
+	struct gatherer g = { .job = j, .to = &j->reciprocal, .landings = &j->landings,
+	                      .begin = begin, .end = j->o.to_patches ? begin : end };
+	int useful = any_takes(j) || any_by_formula(j), bad;
 
-	if (!any_takes(j) && !any_by_formula(j))
+	if (!useful && j->o.to_patches)
 		return 0;
-	bad = allocate(&g, threads, e);
-
+	bad = ff_landings_init(&j->landings, j, e) || allocate(&g, threads, e);
 	if (!bad) {
 		par_for(j->m->patch.n, 1, (int)threads, gather_patches, &g, progress);
 		bound_patches(j, j->reciprocal.centre);
 		j->reciprocal.alone = !any_ideal(j);
 	}
-	for (size_t t = 0; !bad && t < threads; t++)
+	for (size_t t = 0; !bad && t < threads; t++) {
+		*rays += g.rays[t];
 		if (g.err[t].set)
 			bad = err_set(e, "%s", g.err[t].text);
-	for (uint32_t ps = 0; !bad && ps < 2 * j->m->patch.n; ps++)
-		if (!j->is_black[ps] && !j->is_ideal[ps])
-			*rays += patch_rays(j, ps >> 1);
+	}
 	bad = bad || transpose(&g, e);
 	release(&g, threads);
-	j->reciprocal.rays = bad ? 0 : j->o.gather;
+	j->reciprocal.rays = bad || !useful ? 0 : j->o.gather;
 	return bad ? -1 : 0;
 }
 
@@ -446,7 +465,7 @@ static double landing(const struct ff_thread *t, uint32_t ps, uint32_t cast, dou
 {
 	const struct ff_job *j = t->job;
 
-	*rays = cast ? cast : patch_rays(j, ps >> 1);
+	*rays = cast ? cast / t->boost : patch_rays(j, ps >> 1);
 	return cast ? own_landed(t, ps, cast) : 1 - j->reciprocal.escape[ps] - j->reciprocal.black[ps];
 }
 
@@ -468,7 +487,7 @@ int ff_combine_estimates(struct ff_thread *t, uint32_t ps, uint32_t cast, struct
 	if (!cast)
 		book_lost(t, ps, 1 - lands);
 	put_shares(t, ps, total * lands / sum);
-	per_sample += cast ? (1 - lands) / cast : 0;
+	per_sample += cast ? (1 - lands) / rays : 0;
 	*w = (struct ff_weight){ (uint32_t)fmax(1, fmin(UINT32_MAX, 1 / per_sample)), total };
 	return 1;
 }

@@ -9,8 +9,8 @@
  * pane, jointly stratified over its area and hemisphere, into j->reciprocal; adds to *rays.
  * Memory: 16 bytes for every pair of an element-side and a patch-side that it sees.
  * O(element-sides x rays x log triangles). 0, or -1 and e. */
-int ff_reciprocal_cast(struct ff_job *j, double *rays, const struct progress *progress,
-                       struct err *e);
+int ff_reciprocal_cast(struct ff_job *j, uint32_t begin, uint32_t end, double *rays,
+                       const struct progress *progress, struct err *e);
 void ff_reciprocal_free(struct ff_reciprocal *g);
 
 /* 1 if the row of a patch-side needs no rays of its own. */

@@ -52,6 +52,22 @@ struct ff_reciprocal {
 	                             taken as its own */
 };
 
+/* Landings of a patch's rays, in the order of places. */
+struct ff_patch_landings {
+	struct array landing, chain; /* uint32_t; chains by the thread's numbers, if any event is */
+	int thread;
+};
+
+struct ff_landings {
+	const struct ff_job *job;
+	size_t threads;
+	struct ff_patch_landings *patch; /* [P] until they are put into batches */
+	uint32_t *rays, *lost, *count; /* [2E] by place */
+	struct chains *chains;    /* [threads] */
+	struct array *map;        /* [threads] to the numbers of the whole */
+	struct lobe_table *table; /* [events] of finite lobes */
+};
+
 /* Shared, read-only while rows are computed. */
 struct ff_job {
 	const struct model *m;
@@ -77,6 +93,7 @@ struct ff_job {
 	struct ff_samples of_rows, of_reciprocal, of_small;
 	struct tally_places places;
 	struct ff_reciprocal reciprocal;
+	struct ff_landings landings;
 	uint8_t *halvings;        /* [2P] how often the rays of a row are halved; NULL: never */
 	struct ff_formula formula;
 };
@@ -129,6 +146,7 @@ struct ff_thread {
 	struct view *view;        /* hemicube: [points][2 sides] */
 	double rays;
 	struct array shares;      /* struct ff_share */
+	uint32_t boost;           /* weights of a row over its rays: ray_guide.h */
 	struct array arrivals;    /* struct light_arrival, of the light in work */
 	struct exchanger *formula; /* NULL: nothing is computed by formula */
 	struct ff_ray_batch lobe; /* lobe rays waiting to be cast */

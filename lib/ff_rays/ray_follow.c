@@ -220,9 +220,10 @@ static void world_ray(const struct ff_job *j, const struct ff_ray_batch *b, uint
 }
 
 /* Ray i of a batch, at all that may befall it. side: that it left its element by. */
-static void land_apart(struct ff_thread *t, int side, const struct ff_ray_batch *b, uint32_t i)
+static void land_apart(struct ff_thread *t, int side, const struct ff_ray_batch *b, uint32_t i,
+                       uint32_t weight)
 {
-	struct flight stack[MAX_SPLITS + 3], f = { .w = 1 };
+	struct flight stack[MAX_SPLITS + 3], f = { .w = weight };
 	double x = (double)b->ray.w[0][i], y = (double)b->ray.w[1][i];
 	struct ray_hit hit = { .triangle = b->ray.triangle[i], .side = (int)b->ray.side[i],
 	                       .w = { 1 - x - y, x, y } };
@@ -238,14 +239,15 @@ static void land_apart(struct ff_thread *t, int side, const struct ff_ray_batch 
 	fly(t, stack, land(t, &f, &hit, b->hit[i], stack));
 }
 
-static void batch_land(struct ff_thread *t, int side, uint32_t n, const struct ff_ray_batch *b)
+static void batch_land(struct ff_thread *t, int side, uint32_t n, const struct ff_ray_batch *b,
+                       uint32_t weight)
 {
 	const uint32_t *place = t->job->places.place;
 	uint32_t escaped = 0, simple = 0;
 
 	for (uint32_t i = 0; i < n; i++) {
 		if (t->capturing) {
-			land_apart(t, side, b, i);
+			land_apart(t, side, b, i, weight);
 			continue;
 		}
 		if (b->ray.triangle[i] == RAY_MISS) {
@@ -254,14 +256,14 @@ static void batch_land(struct ff_thread *t, int side, uint32_t n, const struct f
 		}
 		uint32_t at = place[2 * b->hit[i] + b->ray.side[i]];
 		if (at & TALLY_APART) {
-			land_apart(t, side, b, i);
+			land_apart(t, side, b, i, weight);
 		} else {
-			ff_tally_count(&t->tally, at);
+			ff_tally_count(&t->tally, at, weight);
 			simple++;
 		}
 	}
 	t->rays += escaped + simple;
-	ff_tally_rest(&t->tally, 0)->escape += escaped;
+	ff_tally_rest(&t->tally, 0)->escape += (double)weight * escaped;
 }
 
 void ff_cast_side(struct ff_thread *t, uint32_t ps, uint32_t count, double exponent,
@@ -283,15 +285,65 @@ void ff_cast_side(struct ff_thread *t, uint32_t ps, uint32_t count, double expon
 			else
 				lobe_directions(j, ps, exponent, n, &b);
 			ff_rays_cast(j, n, &b);
-			batch_land(t, (int)(ps & 1), n, &b);
+			batch_land(t, (int)(ps & 1), n, &b, 1);
 		}
 		ff_tally_replicate(&t->tally);
 	}
 }
 
+static void send_batch(struct ff_thread *t, uint32_t ps, uint32_t *n, struct ff_ray_batch *b,
+                       uint32_t weight)
+{
+	const struct ff_job *j = t->job;
+
+	ff_rays_elements(j, ps >> 1, *n, b);
+	ff_rays_origins(j, (int)(ps & 1), *n, b);
+	ff_rays_directions(j, (int)(ps & 1), *n, b);
+	ff_rays_cast(j, *n, b);
+	batch_land(t, (int)(ps & 1), *n, b, weight);
+	*n = 0;
+}
+
+/* Those of the first `count` points of a replicate that are in the guide's cells, or not. Returns what
+ * they weigh. */
+static uint32_t cast_cells(struct ff_thread *t, uint32_t ps, const struct ff_scramble *s, uint32_t count,
+                       const struct ff_guide *g, int in)
+{
+	struct ff_ray_batch numbers, b = { .choice = { 0 } };
+	uint32_t have = 0, weight = in ? 1 : g->boost, all = 0;
+
+	for (uint32_t first = 0; first < count; first += RAY_BATCH) {
+		uint32_t n = count - first < RAY_BATCH ? count - first : RAY_BATCH, taken = 0;
+		ff_rays_numbers(&t->job->of_rows, s->seed, first, n, &numbers);
+		while (taken < n) {
+			taken = ff_guide_take(g, in, &numbers, taken, n, &b, &have);
+			if (have == RAY_BATCH) {
+				all += weight * have;
+				send_batch(t, ps, &have, &b, weight);
+			}
+		}
+	}
+	all += weight * have;
+	send_batch(t, ps, &have, &b, weight);
+	return all;
+}
+
+uint32_t ff_cast_guided(struct ff_thread *t, uint32_t ps, uint32_t count, const struct ff_guide *g)
+{
+	uint32_t weight = 0;
+
+	for (uint32_t r = 0; r < FF_REPLICATES; r++) {
+		struct ff_scramble s = ff_scramble(t->job, 2 * ps, r);
+		weight += cast_cells(t, ps, &s, count / FF_REPLICATES, g, 0);
+		weight += cast_cells(t, ps, &s, count / FF_REPLICATES * g->boost, g, 1);
+		ff_tally_replicate(&t->tally);
+	}
+	return weight;
+}
+
 void ff_lobes_cast(struct ff_thread *t)
 {
 	ff_rays_cast(t->job, t->lobes, &t->lobe);
-	batch_land(t, 0, t->lobes, &t->lobe);
+	batch_land(t, 0, t->lobes, &t->lobe, 1);
 	t->lobes = 0;
 }

@@ -131,16 +131,21 @@ static int sort_links(struct ff_batch *b, struct err *e)
 	return 0;
 }
 
+int ff_batch_renumber_chains(uint32_t *chain, size_t n, const struct chains *local,
+                             struct array *map, struct chains *whole, struct err *e)
+{
+	for (size_t i = 0; i < n; i++)
+		if (map_chain(&chain[i], local, map, whole, e))
+			return -1;
+	return 0;
+}
+
 int ff_batch_renumber(struct ff_batch *b, const struct chains *local, struct array *map,
                       struct chains *whole, struct err *e)
 {
-	for (size_t i = 0; i < b->block_chain.n; i++)
-		if (map_chain((uint32_t *)b->block_chain.data + i, local, map, whole, e))
-			return -1;
-	for (size_t i = 0; i < b->link_chain.n; i++)
-		if (map_chain((uint32_t *)b->link_chain.data + i, local, map, whole, e))
-			return -1;
-	return sort_links(b, e);
+	return ff_batch_renumber_chains(b->block_chain.data, b->block_chain.n, local, map, whole, e) ||
+	       ff_batch_renumber_chains(b->link_chain.data, b->link_chain.n, local, map, whole, e) ||
+	       sort_links(b, e) ? -1 : 0;
 }
 
 struct ff ff_batch_view(const struct ff_batch *b)
@@ -162,6 +167,11 @@ struct ff ff_batch_view(const struct ff_batch *b)
 		.link.source = b->link_source.data, .link.last = b->link_last.data,
 		.link.chain = b->link_chain.data,
 		.link.direction = b->link_direction.data, .link.row = b->link_row.data,
+		.gathered.sides = b->gathered_rays.n, .gathered.rays = b->gathered_rays.data,
+		.gathered.lost = b->gathered_lost.data,
+		.gathered.count = b->gathered_count.data, .gathered.n = b->gathered_landing.n,
+		.gathered.landing = b->gathered_landing.data,
+		.gathered.chain = b->gathered_chain.n ? b->gathered_chain.data : NULL,
 	};
 	return f;
 }
@@ -173,7 +183,8 @@ void ff_batch_free(struct ff_batch *b)
 		&b->block_start, &b->escape, &b->black, &b->lost, &b->cut, &b->block_arrival,
 		&b->column, &b->value, &b->arrival_target, &b->arrival_direction,
 		&b->link_target, &b->link_source, &b->link_last, &b->link_chain, &b->link_direction,
-		&b->link_row };
+		&b->link_row, &b->gathered_rays, &b->gathered_lost, &b->gathered_count, &b->gathered_landing,
+		&b->gathered_chain };
 
 	for (size_t i = 0; i < sizeof v / sizeof *v; i++)
 		free(v[i]->data);

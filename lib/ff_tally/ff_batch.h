@@ -15,6 +15,7 @@ struct ff_batch {
 	struct array block_arrival, column, value;
 	struct array arrival_target, arrival_direction;
 	struct array link_target, link_source, link_last, link_chain, link_direction, link_row;
+	struct array gathered_rays, gathered_lost, gathered_count, gathered_landing, gathered_chain;
 };
 
 /* Flux of a chain that reaches no modelled element-side. */
@@ -50,6 +51,10 @@ int ff_batch_put_row(struct ff_batch *b, const struct ff_batch_row *r, struct er
  * are. Called in row order, so numbers do not depend on threads. */
 int ff_batch_renumber(struct ff_batch *b, const struct chains *local, struct array *map,
                       struct chains *whole, struct err *e);
+
+/* The same for n chain numbers that belong to others. */
+int ff_batch_renumber_chains(uint32_t *chain, size_t n, const struct chains *local,
+                             struct array *map, struct chains *whole, struct err *e);
 
 /* The batch seen as a struct ff (borrowed arrays). */
 struct ff ff_batch_view(const struct ff_batch *b);

@@ -118,8 +118,8 @@ static void note_arrival(struct tally *t, uint32_t chain, uint32_t target, doubl
 
 static void hit_near(struct tally *t, uint32_t place, uint32_t ps, double w)
 {
-	if (w == 1) {
-		ff_tally_count(t, place);
+	if (w >= 1 && w <= UINT16_MAX && w == floor(w)) { /* whole: rays, or those that stand for several */
+		ff_tally_count(t, place, (uint32_t)w);
 		return;
 	}
 	t->weighed = 1;

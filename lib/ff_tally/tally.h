@@ -67,12 +67,12 @@ static inline void ff_tally_touch(struct tally *t, uint32_t place)
 	t->words_touched[place >> 12] |= (uint64_t)1 << (place >> 6 & 63);
 }
 
-/* A landing of weight 1 by chain 0 at a place without a lobe. */
-static inline void ff_tally_count(struct tally *t, uint32_t place)
+/* Landings of weight 1, or one of a whole weight, by chain 0 at a place without a lobe. */
+static inline void ff_tally_count(struct tally *t, uint32_t place, uint32_t weight)
 {
 	int r = t->replicates < TALLY_REPLICATES ? t->replicates : TALLY_REPLICATES - 1;
 
-	t->count[place][r]++;
+	t->count[place][r] += weight;
 	ff_tally_touch(t, place);
 }
 

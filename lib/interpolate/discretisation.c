@@ -174,34 +174,113 @@ static void differences(void *arg, size_t begin, size_t end, int thread)
 
 /* ---- noise ---- */
 
-/* A quantile of difference squared over its stated variance in the sum of the parts begin
- * to end, to 5 %, by a histogram of logarithms; INFINITY where there is no noise. */
-static double quantile_of_ratios(const struct job *j, size_t begin, size_t end, double q)
+/* Stated errors take samples for independent; stratified ones do the better, the more there are. So
+ * elements are looked at by classes of how many independent samples their light is worth, H^2 over its
+ * variance, in steps of 4. A class of fewer than CLASS_LEAST is as good as the one below, the least
+ * as all are: a guess, with which the quantile is known to a tenth. */
+enum { CLASSES = 12, CLASS_LEAST = 256 };
+
+struct scales {
+	double of[CLASSES];
+};
+
+/* The light of a side, difference squared and variance of the parts begin to end together. */
+struct light {
+	double h, difference, noise, variance;
+};
+
+static struct light light_of(const struct job *j, size_t i, size_t begin, size_t end)
 {
-	/* 16 bins a factor of 2 are 4 % each; 2048 of them span 2^128, and 1e-18 is 2^-60, near
-	 * their lower end at 2^-64. */
-	enum { BINS = 2048, A_FACTOR_2 = 16 };
-	static const double ratio_least = 1e-18;
-	size_t bands = (size_t)j->s->bands, n = j->s->element_sides * bands;
-	size_t count[BINS] = { 0 }, all = 0, below = 0;
+	size_t bands = (size_t)j->s->bands;
+	struct light l = { 0 };
+
+	for (size_t part = begin; part < end; part++) {
+		size_t at = (i / bands * PARTS + part) * bands + i % bands;
+		l.h += j->h[at];
+		l.difference += j->difference[at];
+		l.noise += j->noise[at];
+		l.variance += j->variance[at];
+	}
+	return l;
+}
+
+/* Its class: the number below. */
+static double class_of(const struct light *l)
+{
+	double samples = l->variance > 0 ? l->h * l->h / l->variance : 1;
+
+	return fmax(0, fmin(CLASSES - 1, .5 * log2(samples)));
+}
+
+/* Between the middles of classes. */
+static double scale_of(const struct scales *s, const struct light *l)
+{
+	double at = fmax(0, fmin(CLASSES - 1, class_of(l) - .5)), below = fmin(CLASSES - 2, floor(at));
+	const double *of = &s->of[(size_t)below];
+
+	return of[0] + (at - below) * (of[1] - of[0]);
+}
+
+/* Difference squared over stated variance, by class, in bins of its logarithm: 16 bins a factor of
+ * 2 are 4 % each, and span 2^64. */
+enum { BINS = 1024, A_FACTOR_2 = 16 };
+
+typedef uint32_t bins[CLASSES][BINS];
+
+static void count_ratios(const struct job *j, size_t begin, size_t end, bins count)
+{
+	/* 2^-30, near the lower end of the bins at 2^-32. */
+	static const double ratio_least = 1e-9;
+
+	for (size_t i = 0; i < j->s->element_sides * (size_t)j->s->bands; i++) {
+		struct light l = light_of(j, i, begin, end);
+		if (isnan(l.difference) || !(l.noise > 0))
+			continue;
+		double ratio = fmax(l.difference * l.difference / l.noise, ratio_least);
+		double bin = BINS / 2 + A_FACTOR_2 * log2(ratio);
+		count[(size_t)class_of(&l)][(size_t)fmax(0, fmin(BINS - 1, bin))]++;
+	}
+}
+
+/* A quantile of the ratios in bins, to 5 %. */
+static double quantile(const uint32_t *count, size_t all, double q)
+{
+	size_t below = 0;
 	int bin = 0;
 
-	for (size_t i = 0; i < n; i++) {
-		double d = 0, noise = 0;
-		for (size_t part = begin; part < end; part++) {
-			size_t at = (i / bands * PARTS + part) * bands + i % bands;
-			d += j->difference[at];
-			noise += j->noise[at];
-		}
-		if (isnan(d) || !(noise > 0))
-			continue;
-		double at = BINS / 2 + A_FACTOR_2 * log2(fmax(d * d / noise, ratio_least));
-		count[(size_t)fmax(0, fmin(BINS - 1, at))]++;
-		all++;
-	}
 	while (bin < BINS - 1 && (double)(below + count[bin]) < q * (double)all)
 		below += count[bin++];
-	return all ? exp2((bin + .5 - BINS / 2) / A_FACTOR_2) : INFINITY;
+	return exp2((bin + .5 - BINS / 2) / A_FACTOR_2);
+}
+
+/* What variances of the parts begin to end are to be scaled by, by class. */
+static int find_scales(const struct job *j, size_t begin, size_t end, struct scales *s,
+                       struct err *e)
+{
+	/* The quantile that is compared: steps are in the other .3 of the elements, a guess that
+	 * test_discretisation.c checks with a step. Of chi-square with one degree of freedom it is
+	 * 1.0742. */
+	static const double most = .7, chi_square = 1.0742;
+	bins *count = mem_new(1, sizeof *count, "noise", e);
+	uint32_t together[BINS] = { 0 };
+	size_t n[CLASSES] = { 0 }, all = 0;
+
+	if (!count)
+		return -1;
+	count_ratios(j, begin, end, *count);
+	for (size_t i = 0; i < CLASSES * BINS; i++) {
+		n[i / BINS] += (*count)[i / BINS][i % BINS];
+		together[i % BINS] += (*count)[i / BINS][i % BINS];
+		all += (*count)[i / BINS][i % BINS];
+	}
+	double last = all ? fmin(1, quantile(together, all, most) / chi_square) : 1;
+	for (size_t c = 0; c < CLASSES; c++) {
+		if (n[c] >= CLASS_LEAST)
+			last = fmin(1, quantile((*count)[c], n[c], most) / chi_square);
+		s->of[c] = last;
+	}
+	free(count);
+	return 0;
 }
 
 /* Whether light arrives by patches, whose elements then say nothing of its noise. */
@@ -219,27 +298,31 @@ static int by_patches(const struct job *j)
 	return shared;
 }
 
-/* Stated errors take samples for independent. Where most elements differ less from their
- * neighbours than that says, errors are scaled to what they do: those of the parts, and
- * those of all light apart, since what a form factor is off by is in both parts. */
-static void correct_noise(struct job *j)
+/* Where most elements of a class differ less from their neighbours than stated errors say, these are
+ * scaled to what they do: those of the parts, and those of all light apart, since what a form
+ * factor is off by is in both parts. */
+static int correct_noise(struct job *j, struct err *e)
 {
-	/* The quantile that is compared: steps are in the other .3 of the elements, a guess that
-	 * test_discretisation.c checks with a step. Of chi-square with one degree of freedom it is
-	 * 1.0742. */
-	static const double most = .7, chi_square = 1.0742;
 	size_t bands = (size_t)j->s->bands, n = j->s->element_sides * bands;
-	double scale[PARTS], whole = fmin(1, quantile_of_ratios(j, 0, PARTS, most) / chi_square);
+	struct scales part[PARTS], whole;
 
-	for (size_t part = 0; part < PARTS; part++)
-		scale[part] = fmin(1, quantile_of_ratios(j, part, part + 1, most) / chi_square);
-	for (size_t i = 0; i < n * PARTS; i++)
-		j->noise[i] *= scale[i / bands % PARTS];
+	for (size_t p = 0; p < PARTS; p++)
+		if (find_scales(j, p, p + 1, &part[p], e))
+			return -1;
+	if (find_scales(j, 0, PARTS, &whole, e))
+		return -1;
 	for (size_t i = 0; i < n; i++) {
-		const double *v = &j->variance[i / bands * PARTS * bands + i % bands];
-		j->s->error.sampling_direct[i] = sqrt(scale[0] * v[0]);
-		j->s->error.sampling[i] = sqrt(fmax(scale[0] * v[0], whole * (v[0] + v[bands])));
+		struct light direct = light_of(j, i, 0, 1), other = light_of(j, i, 1, 2);
+		struct light all = light_of(j, i, 0, PARTS);
+		double *noise = &j->noise[i / bands * PARTS * bands + i % bands];
+		double scale = scale_of(&part[0], &direct);
+		j->s->error.sampling_direct[i] = sqrt(scale * direct.variance);
+		j->s->error.sampling[i] = sqrt(fmax(scale * direct.variance,
+		                                    scale_of(&whole, &all) * all.variance));
+		noise[0] *= scale;
+		noise[bands] *= scale_of(&part[1], &other);
 	}
+	return 0;
 }
 
 /* ---- errors ---- */
@@ -332,10 +415,9 @@ int interp_discretisation(const struct model *m, struct solution *s, int threads
 	    !interp_smooth_groups_new(m, COS_CREASE, &j.g, e)) {
 		take_parts(&j);
 		par_for(m->element.n, CHUNK, threads, differences, &j, NULL);
-		if (!by_patches(&j))
-			correct_noise(&j);
-		par_for(m->element.n, CHUNK, threads, errors, &j, NULL);
-		bad = 0;
+		bad = !by_patches(&j) && correct_noise(&j, e);
+		if (!bad)
+			par_for(m->element.n, CHUNK, threads, errors, &j, NULL);
 	}
 	free(j.h);
 	free(j.variance);

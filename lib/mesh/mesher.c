@@ -5,27 +5,24 @@
 
 #include "lib/base/mem.h"
 #include "lib/base/vec.h"
+#include "lib/geometry/enclosing_ball.h"
 #include "lib/mesh/stages.h"
 #include "lib/scatter/bsdf.h"
 
-static double metres(struct mesh_size s, double diagonal)
+static double metres(struct mesh_size s, double diameter)
 {
-	return s.relative ? s.value * diagonal : s.value;
+	return s.relative ? s.value * diameter : s.value;
 }
 
 static int set_sizes(const struct model *m, const struct mesh_options *o,
                      struct mesh_report *r, struct err *e)
 {
-	double lo[3], hi[3], d[3];
-
-	model_box(m, lo, hi);
-	v3_sub(hi, lo, d);
-	r->diagonal = v3_length(d);
-	r->patch_size = metres(o->patch, r->diagonal);
-	r->element_size = metres(o->element, r->diagonal);
+	r->diameter = 2 * geo_enclosing_ball(m->vertex, m->vertices).radius;
+	r->patch_size = metres(o->patch, r->diameter);
+	r->element_size = metres(o->element, r->diameter);
 	if (o->element_within_patch)
 		r->element_size = fmin(r->element_size, r->patch_size);
-	if (!isfinite(r->diagonal))
+	if (!isfinite(r->diameter))
 		return err_set(e, "the scene is too large for double precision");
 	return 0;
 }
@@ -160,7 +157,7 @@ int mesh_run(struct model *m, const struct mesh_options *o, struct mesh_report *
 		return -1;
 	tell(o, 1);
 	if ((!o->no_imprint && mesh_imprint(m, r->element_size, r, e)) ||
-	    mesh_bisect(m, r->element_size, e))
+	    mesh_bisect(m, r->element_size, e) || mesh_divide_near_lights(m, r->element_size, e))
 		return -1;
 	tell(o, 2);
 	if (make_patches(m, o, r, e))
@@ -251,7 +248,7 @@ int mesh_refine(struct model *m, const struct mesh_options *o, struct model *old
 	struct plan plan = { mem_new(old->element.n, 1, "elements", e),
 		             mem_new(old->patch.n, 1, "patches", e) };
 	int status = plan.element && plan.patch &&
-	             !mesh_adapt_plan(old, s, how, metres(how->smallest, r->diagonal), plan.element,
+	             !mesh_adapt_plan(old, s, how, metres(how->smallest, r->diameter), plan.element,
 	                              plan.patch, r, e) ? 0 : -1;
 	tell(o, 2);
 	if (!status) {

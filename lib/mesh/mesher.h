@@ -12,8 +12,8 @@
 
 struct solution;
 
-/* A length in metres or, if relative, as a fraction of the diagonal of the
- * scene's bounding box; INFINITY = no bound. */
+/* A length in metres or, if relative, as a fraction of the diameter of the
+ * smallest ball about the scene; INFINITY = no bound. */
 struct mesh_size {
 	double value;
 	int relative;
@@ -29,7 +29,7 @@ struct mesh_options {
 	const struct progress *progress; /* or NULL */
 };
 
-/* Patches of 5 % of the diagonal, elements of 4 %, a cone of 20 degrees: guesses, which
+/* Patches of 5 % of the diameter, elements of 4 %, a cone of 20 degrees: guesses, which
  * tests/bench/RESULTS.md compares with others for elements and refinement. */
 #define MESH_OPTIONS_DEFAULT \
 	((struct mesh_options){ .patch = { .05, 1 }, .element = { .04, 1 }, \
@@ -64,7 +64,7 @@ struct mesh_report {
 	size_t fine_contacts;            /* contacts too short to be worth a cut */
 	size_t covered;                  /* triangles and parts dropped under coplanar surfaces */
 
-	double diagonal;                 /* of the scene's bounding box, m */
+	double diameter;                 /* of the smallest ball about the scene, m */
 	double patch_size, element_size; /* m, or INFINITY */
 	size_t planar_patches;
 	uint32_t largest_patch;          /* elements in it */

@@ -8,6 +8,7 @@
 #include "lib/base/mem.h"
 #include "lib/base/vec.h"
 #include "lib/geometry/half_edge.h"
+#include "lib/geometry/enclosing_ball.h"
 #include "lib/mesh/stages.h"
 
 /* Uses of an edge that are compared with one another, each with so many after it: all would be
@@ -23,7 +24,7 @@ static const double coplanar_cosine = .9, coplanar_height = 1e-6;
 static const double has_direction = .1;
 
 /* A plane piece stays by itself if it is wider than the first of these times the patch size, or
- * times that fraction (the second) of the scene's diagonal where it is smaller. Guesses. */
+ * times that fraction (the second) of the scene's diameter where it is smaller. Guesses. */
 static const double large_width = .25, large_in_scene = .1;
 
 struct finder {
@@ -301,7 +302,8 @@ int mesh_find_regions(const struct model *m, double size, double cos_cone, uint3
 	f.noise = 0x1p-23 * v3_length(diagonal);
 	triangle_areas(&f);
 	for_neighbours(&f, join_coplanar);
-	mark_large(&f, large_width * fmin(size, large_in_scene * v3_length(diagonal)), sum);
+	mark_large(&f, large_width * fmin(size, large_in_scene *
+	                                  2 * geo_enclosing_ball(m->vertex, m->vertices).radius), sum);
 	memcpy(f.region, f.plane, n * sizeof *f.region);
 	for_neighbours(&f, join_smooth);
 	if (number_regions(&f, region, regions, count, e))

@@ -56,6 +56,11 @@ int mesh_imprint(struct model *m, double size, struct mesh_report *r, struct err
  * together with all triangles that share it. */
 int mesh_bisect(struct model *m, double size, struct err *e);
 
+/* near_lights.c: divides elements where light of an emitter varies over less than their longest
+ * edge, close to its outline, or of a punctual light, down to a sixteenth of `size`. O(n log n) in the elements made, if
+ * few lights are close to each. */
+int mesh_divide_near_lights(struct model *m, double size, struct err *e);
+
 /* Divides the elements of a model further, element i at least halvings[i] times, and its
  * neighbours where no edge would otherwise be halved. Replaces vertices, elements and split
  * trees; (*origin)[e] = the element that the new one was part of, to be freed. */

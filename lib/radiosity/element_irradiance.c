@@ -12,6 +12,7 @@
 #include "lib/radiosity/propagate.h"
 #include "lib/radiosity/radiosity.h"
 #include "lib/scatter/bsdf.h"
+#include "lib/scatter/bsdf.h"
 
 /* Feeds whose entries are on the way from memory, a count: about what a core can have in flight.
  * A guess; `make bench` (shoot, GB/s) shows what it does. */
@@ -53,6 +54,8 @@ struct element_pass {
 	lanes_f32 *variance[2];      /* [2][receivers], in units of `unit`: of rows that bring
 	                                direct light, and of others */
 	double unit;                 /* the largest that a whole block adds */
+	lanes ideal[2];              /* what variances of either are to be multiplied with on ideal
+	                                sides, which rays alone tell of: see row_cast */
 	size_t channels;
 	size_t first;                /* channel of the four in work */
 	double bytes;
@@ -222,7 +225,7 @@ static enum part part_of(const struct transport *t, uint32_t row, uint32_t chain
 static lanes variance_of(const struct element_pass *pass, uint32_t row, uint64_t b)
 {
 	const struct transport *t = pass->t;
-	uint32_t samples = t->row_samples[row];
+	uint32_t samples = t->block[b].chain ? t->row_cast[row] : t->row_samples[row];
 	size_t bands = (size_t)pass->s->bands;
 	double one = samples ? t->block[t->row_block[row]].sum / samples : 0;
 	lanes v = { 0 };
@@ -270,6 +273,26 @@ static void set_feed(const struct element_pass *pass, uint32_t row, uint64_t b, 
 	                                      lanes_f32);
 }
 
+/* The mean of what rows that light straight are worth over their rays, by the variance that each has:
+ * one number for all, as only an error depends on it. */
+static void set_ideal(struct element_pass *pass)
+{
+	const struct transport *t = pass->t;
+	lanes all[2] = { { 0 } }, cast[2] = { { 0 } };
+
+	for (uint32_t row = 0; row < t->rows; row++) {
+		uint64_t b = t->row_block[row];
+		const double *from_emitter = pass->block_flux[0] + b * pass->channels + pass->first;
+		int other = part_of(t, row, 0) != DIRECT || !(from_emitter[0] > 0);
+		lanes v = variance_of(pass, row, b);
+		all[other] += v;
+		cast[other] += v * ((double)t->row_samples[row] / fmax(1, t->row_cast[row]));
+	}
+	for (int i = 0; i < 2; i++)
+		for (int k = 0; k < LANES; k++)
+			pass->ideal[i][k] = all[i][k] > 0 ? fmax(1, cast[i][k] / all[i][k]) : 1;
+}
+
 /* Blocks with flux in the four channels in work, or any where they have variances. */
 static void set_feeds(struct element_pass *pass)
 {
@@ -283,8 +306,8 @@ static void set_feeds(struct element_pass *pass)
 			unsigned carries = 0;
 			for (size_t c = pass->first; c < last && c < pass->channels; c++) {
 				size_t at = b * pass->channels + c;
-				carries |= (pass->block_flux[0][at] > 0) |
-				           (unsigned)(pass->block_flux[1][at] > 0) << 1;
+				carries |= (pass->block_flux[0][at] != 0) |
+				           (unsigned)(pass->block_flux[1][at] != 0) << 1;
 			}
 			if (carries)
 				set_feed(pass, row, b, (uint8_t)carries,
@@ -293,6 +316,14 @@ static void set_feeds(struct element_pass *pass)
 }
 
 /* ---- irradiance ---- */
+
+static int is_ideal(const struct model *m, uint32_t patch, int side)
+{
+	uint32_t material = model_patch_material(m, patch);
+
+	return bsdf_has_ideal(&m->material, material, side, 0) ||
+	       bsdf_has_ideal(&m->material, material, side, 1);
+}
 
 static void put_channels(void *arg, size_t begin, size_t end, int thread)
 {
@@ -308,14 +339,18 @@ static void put_channels(void *arg, size_t begin, size_t end, int thread)
 		size_t side = (es & 1) * pass->receivers;
 		size_t from = side + (pass->to_patches ? patch : element);
 		double area = pass->to_patches ? m->patch.area[patch] : m->element.area[element];
+		int ideal = is_ideal(m, patch, (int)(es & 1));
 		for (size_t k = 0; k < LANES && pass->first + k < pass->channels; k++) {
 			size_t c = pass->first + k;
 			size_t at = (c / bands * pass->s->element_sides + es) * bands + c % bands;
 			for (int p = 0; p < H_PARTS; p++)
 				to[p][at] = pass->flux[p][from][k] / area;
+			h->indirect[at] += (double)pass->s->uneven[at];
 			if (c < bands) {
-				double direct = (double)pass->variance[0][from][k] * pass->unit;
-				double other = (double)pass->variance[1][from][k] * pass->unit;
+				double direct = (double)pass->variance[0][from][k] * pass->unit *
+				                (ideal ? pass->ideal[0][k] : 1);
+				double other = (double)pass->variance[1][from][k] * pass->unit *
+				               (ideal ? pass->ideal[1][k] : 1);
 				pass->s->error.sampling_direct[at] = sqrt(direct) / area;
 				pass->s->error.sampling[at] = sqrt(direct + other) / area;
 			}
@@ -358,6 +393,7 @@ static int add_channels(struct element_pass *pass, int threads, struct err *e)
 			memset(pass->variance[0], 0, 2 * n * sizeof **pass->variance);
 		}
 		set_unit(pass);
+		set_ideal(pass);
 		set_feeds(pass);
 		par_for(pass->ranges, 1, threads, add_range, pass, NULL);
 		par_for(pass->s->element_sides, SIDES_AT_A_TIME, threads, put_channels, pass, NULL);

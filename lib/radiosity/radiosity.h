@@ -99,6 +99,12 @@ int radiosity_shoot(struct solution *s, const struct transport *t,
                     const struct radiosity_options *o, const struct radiosity_hooks *hooks,
                     struct radiosity_report *r, struct err *e);
 
+/* All of it: radiosity_shoot and radiosity_element_irradiance, and then, where form factors say how
+ * and if light came to rest, what patches that are not evenly lit change (uneven.h).
+ * O(shots x runs of a row + entries + landings). 0, or -1 and e. */
+int radiosity_solve(struct solution *s, const struct transport *t, const struct radiosity_options *o,
+                    const struct radiosity_hooks *hooks, struct radiosity_report *r, struct err *e);
+
 /* Irradiance of all element-sides and its standard error from what the rows have
  * sent. O(entries). 0, or -1 and e. */
 int radiosity_element_irradiance(struct solution *s, const struct transport *t, int threads,

@@ -1,5 +1,6 @@
 #include "lib/radiosity/transport.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -90,6 +91,7 @@ static int size_arrays(struct transport *t, struct err *e)
 	t->row_side = mem_new(t->rows, sizeof *t->row_side, "rows", e);
 	t->row_kind = mem_new(t->rows, 1, "rows", e);
 	t->row_samples = mem_new(t->rows, sizeof *t->row_samples, "rows", e);
+	t->row_cast = mem_new(t->rows, sizeof *t->row_cast, "rows", e);
 	t->row_block = mem_new(t->rows + 1, sizeof *t->row_block, "rows", e);
 	t->diffuse_row = mem_new(sides, sizeof *t->diffuse_row, "rows", e);
 	t->emission_row = mem_new(sides, sizeof *t->emission_row, "rows", e);
@@ -98,7 +100,8 @@ static int size_arrays(struct transport *t, struct err *e)
 	t->link_target = mem_new(t->links, sizeof *t->link_target, "links", e);
 	t->link_row = mem_new(t->links, 2 * sizeof *t->link_row, "links", e);
 	t->target_link = mem_new(sides + 1, sizeof *t->target_link, "links", e);
-	if (!t->row_side || !t->row_kind || !t->row_samples || !t->row_block ||
+	if (!t->row_side || !t->row_kind || !t->row_samples || !t->row_cast ||
+	    !t->row_block ||
 	    !t->diffuse_row || !t->emission_row || !t->light_row || !t->block || !t->link_target ||
 	    !t->link_row || !t->target_link)
 		return -1;
@@ -106,6 +109,15 @@ static int size_arrays(struct transport *t, struct err *e)
 	memset(t->emission_row, 0xff, sides * sizeof *t->emission_row);
 	memset(t->light_row, 0xff, t->m->light.n * sizeof *t->light_row);
 	return 0;
+}
+
+/* The rays of a row whose weights add up to 1 / scale, if that is 1 each; what formulas and elements
+ * tell of where light lands straight says nothing of longer chains. */
+static uint32_t cast_by(uint32_t samples, double scale)
+{
+	double rays = fmin(UINT32_MAX, 1 / scale);
+
+	return rays < 2 || (samples && samples < rays) ? samples : (uint32_t)rays;
 }
 
 /* Copies a shard's rows and block heads behind `row` rows and `block` blocks. */
@@ -119,6 +131,7 @@ static void put_rows(struct transport *t, uint32_t shard, const uint32_t *chain,
 		t->row_side[row + r] = ps;
 		t->row_kind[row + r] = f->row.kind[r];
 		t->row_samples[row + r] = f->row.samples[r];
+		t->row_cast[row + r] = cast_by(f->row.samples[r], f->row.scale[r]);
 		t->row_block[row + r + 1] = block + f->row.block[r + 1];
 		if (f->row.kind[r] == FF_DIFFUSE)
 			t->diffuse_row[ps] = (uint32_t)(row + r);
@@ -137,10 +150,10 @@ static int join(struct transport *t, int threads, struct err *e)
 {
 	size_t row = 0, block = 0, link = 0;
 	struct link_key *l = mem_new(t->links, sizeof *l, "links", e);
-	int bad = !l;
+	int bad = !l || !(t->shard_chain = mem_new(t->shards, sizeof *t->shard_chain, "chains", e));
 
 	for (uint32_t i = 0; !bad && i < t->shards; i++) {
-		uint32_t *chain = common_chains(t, t->shard[i], e);
+		uint32_t *chain = t->shard_chain[i] = common_chains(t, t->shard[i], e);
 		if ((bad = !chain))
 			break;
 		put_rows(t, i, chain, row, block);
@@ -149,7 +162,6 @@ static int join(struct transport *t, int threads, struct err *e)
 		row += t->shard[i]->row.n;
 		block += t->shard[i]->block.n;
 		link += t->shard[i]->link.n;
-		free(chain);
 	}
 	for (size_t i = 0; !bad && i < t->m->light.n; i++)
 		if (t->light_row[i] == FF_NO_ROW && t->m->light.unit_flux[i] > 0)
@@ -178,10 +190,12 @@ int radiosity_transport_init(struct transport *t, const struct model *m, const s
 
 void radiosity_transport_free(struct transport *t)
 {
-	void *array[] = { t->row_side, t->row_kind, t->row_samples, t->row_block,
+	void *array[] = { t->row_side, t->row_kind, t->row_samples, t->row_cast, t->row_block,
 		t->diffuse_row, t->emission_row, t->light_row, t->block, t->run_target, t->run_sum,
-		t->run_link, t->onward, t->link_target, t->link_row, t->target_link };
+		t->run_link, t->onward, t->link_target, t->link_row, t->target_link, t->shard_chain };
 
+	for (size_t i = 0; t->shard_chain && i < t->shards; i++)
+		free(t->shard_chain[i]);
 	for (size_t i = 0; i < sizeof array / sizeof *array; i++)
 		free(array[i]);
 	bsdf_chains_free(&t->chains);

@@ -49,11 +49,13 @@ struct transport {
 	const struct ff *const *shard;   /* sorted by part */
 	size_t shards;
 	struct chains chains;
+	uint32_t **shard_chain;          /* [shards] numbers of a shard's chains here */
 
 	size_t rows;
 	uint32_t *row_side;              /* source: ff.h */
 	uint8_t *row_kind;
-	uint32_t *row_samples;
+	uint32_t *row_samples;           /* that what lands straight is worth; 0: by formula */
+	uint32_t *row_cast;              /* and what comes by longer chains: at most its rays */
 	uint64_t *row_block;             /* [rows+1] */
 	uint32_t *diffuse_row, *emission_row; /* [2P], FF_NO_ROW where there is none */
 	uint32_t *light_row;             /* [L] */

@@ -193,11 +193,12 @@ static int find_misses(struct view_scene *v, const struct solution *s, int threa
 	int whole = v->method == VIEW_MESH;
 	int bad = whole ? 0 : part_errors(v, s, threads, &some, e);
 	const double *noise = whole ? s->error.sampling : some.error.sampling;
+	const double *uneven = interpolated[v->method] & PART_INDIRECT ? s->error.uneven : NULL;
 	const double *missed = whole ? s->error.discretisation : some.error.discretisation;
 
 	v->miss = mem_new(n, sizeof *v->miss, "errors", e);
 	for (size_t i = 0; i < n && v->miss && !bad; i++)
-		v->miss[i] = (float)hypot(noise ? noise_left * noise[i] : 0,
+		v->miss[i] = (float)hypot(hypot(noise ? noise_left * noise[i] : 0, uneven ? uneven[i] : 0),
 		                          missed ? discretisation_left * missed[i] : 0);
 	solution_free(&some);
 	return bad || !v->miss ? -1 : 0;

@@ -274,7 +274,7 @@ def chain_field(rad):
 
 
 def ledger_of(arrays):
-    terms = ("emitted", "absorbed", "escaped", "lost", "cut")
+    terms = ("emitted", "absorbed", "escaped", "lost", "cut", "uneven")
     return dict(zip(terms, arrays["ledger"].sum(1)))
 
 

@@ -311,7 +311,7 @@ static double shared_rays(double emission, uint32_t *most, uint32_t *least)
 
 	make(&m, emission, 0);
 	assert_int_equal(ff_job_init(&j, &m, &o, &e) || ff_job_prepare(&j, 1, &e) ||
-	                 ff_reciprocal_cast(&j, &rays, NULL, &e) || ff_share_rays(&j, &e), 0);
+	                 ff_reciprocal_cast(&j, 0, (uint32_t)m.patch.n, &rays, NULL, &e) || ff_share_rays(&j, &e), 0);
 	*most = 0, *least = UINT32_MAX;
 	for (uint32_t ps = 0; ps < 2 * m.patch.n; ps++) {
 		uint32_t n = ff_row_rays(&j, ps);

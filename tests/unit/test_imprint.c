@@ -77,7 +77,7 @@ static struct mesh_report mesh(struct model *m, double size)
 		reach = fmax(reach, fabs(m->vertex[i]));
 	linear_uvs(m);
 	struct mesh_report r = run(m, sizes(2 * size, size, 0));
-	assert_near(input_area(m), area, (1e-12 + 1e-14 * reach / r.diagonal) * area);
+	assert_near(input_area(m), area, (1e-12 + 1e-14 * reach / r.diameter) * area);
 	check_uvs(m, reach);
 	check_no_contacts(m, size);
 	return r;

@@ -24,6 +24,8 @@ class Plan:
     lobe_samples: int        # particles of the yardstick
     lobe_size: float         # of patches and elements
     exponents: tuple         # of a lobe that becomes a mirror
+    rooms: int = 20          # of uneven.py
+    room_particles: int = 2_000_000
     most: dict = field(default_factory=dict)  # {(scene, method): settings}, fewer than all
 
     def settings(self, scene, method):
@@ -63,7 +65,7 @@ FULL = Plan(
     ff_rays=409600, oracles=(), oracle_methods=("hemicube", "rays", "best"), hard=True,
     lobe_scenes=(), lobe_exponents=(5, 20, 100, 1000),
     lobe_schemes=("paper", "centroid", "one lobe", "default", "fine"),
-    lobe_samples=16_000_000, lobe_size=.25, exponents=EXPONENTS)
+    lobe_samples=16_000_000, lobe_size=.25, exponents=EXPONENTS, rooms=100, room_particles=8_000_000)
 QUICK = Plan(
     about="A quick try of the programs: samples are so few that the errors mean nothing.",
     scenes=("cornell",), samples={name: (32, 100_000) for name in PLAN.scenes},
@@ -71,5 +73,5 @@ QUICK = Plan(
     ff_scenes=("cube16",), ff_rays=4096, oracles=("furnace_hetero_diffuse",), oracle_methods=("best",),
     hard=False, lobe_scenes=("twice",), lobe_exponents=(20,), lobe_schemes=("paper", "default"),
     lobe_samples=100_000, lobe_size=.5,
-    exponents=(30, 1000, 10_000),
+    exponents=(30, 1000, 10_000), rooms=1, room_particles=10_000,
     most={"hemicube": 1, "rays": 1, "auto": 1, "analytic": 0, None: 1})

@@ -1,4 +1,5 @@
 """What the programs state of their own errors, beside what these are."""
+import uneven
 from page import Bar, Table, Title, Words
 from setting import View
 from speed import percent, seconds
@@ -7,6 +8,8 @@ SOLVED = ["scene", "solution", "sampling", "irradiance", "stated / true", "betwe
           "picture by elements", "stated / true"]
 SEEN = ["scene", "solution", "trace", "stated", "picture", "stated / true"]
 LOBES_SEEN = ["scene", "solution", "trace", "seconds", "picture", "bias", "stated", "stated / true"]
+ROOMS = ["rooms", "of them", "true / stated, rms", "least", "first quarter", "median", "third quarter",
+         "largest", "true error, median", "worst mean of a surface, median", "largest"]
 LEDGER, FACTOR = 1e-12, 2
 # How lobes of finite exponent are seen: the paper's way, and others.
 LOBES = ["--lobe-samples 0", "--lobe-samples 4", "--lobe-samples 16", ""]
@@ -73,7 +76,25 @@ def best(views):
                all(e[-1] < e[0] for e in by_scene.values()) if by_scene else None)
 
 
+def rooms(run):
+    for i in range(run.plan.rooms):
+        kind = uneven.KINDS[i % len(uneven.KINDS)]
+        run.tell(f"rooms drawn at random: {i + 1} of {run.plan.rooms}")
+        yield uneven.try_room(1000 + i, kind, run.plan.room_particles)
+
+
+def of_rooms(what, tried):
+    """The distribution of true over stated errors."""
+    worst = sorted(abs(t.worst) for t in tried)
+    errors = sorted(t.error for t in tried)
+    return [what, len(tried), f"{uneven.rms_of(tried):.2f}",
+            *(f"{x:.2f}" for x in uneven.quantiles(tried)), percent(errors[len(errors) // 2]),
+            percent(worst[len(worst) // 2]), percent(worst[-1])]
+
+
 def section(run):
+    tried = list(rooms(run))
+    kinds = sorted({t.kind for t in tried}, key=uneven.KINDS.index)
     lobes = list(views_of_lobes(run))
     views = [r.view for r in run.rows] + run.views + lobes
     solved, seen = [of_solution(r) for r in run.rows], [of_view(v) for v in views]
@@ -82,6 +103,9 @@ def section(run):
     run.bars += [
         best(lobes), bar("stated error of pictures", [r for _, r in seen]),
         bar("stated error of irradiance, from sampling", [r for _, r in solved]),
+        Bar("stated error of irradiance, rooms at random", "true / stated, rms .7 to 1.4, none above 2",
+            f"rms {uneven.rms_of(tried):.2f}, largest {uneven.quantiles(tried)[-1]:.2f}",
+            .7 <= uneven.rms_of(tried) <= 1.4 and uneven.quantiles(tried)[-1] <= 2),
         Bar("ledger, after every shot", f"≤ {LEDGER:g}",
             "" if worst is None else f"{worst:.1e} at most",
             None if worst is None else worst <= LEDGER)]
@@ -93,6 +117,13 @@ def section(run):
         part of the error of a picture by elements (`trace -d mesh`), which has more.""")
     yield Table("Solutions", SOLVED, [cells for cells, _ in solved], left=2)
     yield Table("Pictures", SEEN, [cells for cells, _ in seen], left=3)
+    yield Words("""Rooms drawn at random, with lamps close to walls and in coves, turned at random: the
+        irradiance of elements against particles (`tests/bench/uneven.py`). A kind says what stands
+        in the room beside boxes. Errors are over the mean irradiance, those of surfaces over
+        their own.""")
+    yield Table("Stated against true", ROOMS,
+                [of_rooms(k, [t for t in tried if t.kind == k]) for k in kinds] +
+                [of_rooms("all", tried)], left=1)
     if lobes:
         yield Words("""Lobes of finite exponent in pictures, from what was solved last: by one ray
             about the axis (the paper's way), by samples, and by as many as their noise asks for (the

@@ -182,6 +182,8 @@ static void test_rad(void **state)
 	SAME(s.error.sampling_direct, solution.error.sampling_direct, 18);
 	SAME(s.error.discretisation_direct, solution.error.discretisation_direct, 18);
 	SAME(s.error.discretisation, solution.error.discretisation, 18);
+	SAME(s.error.uneven, solution.error.uneven, 18);
+	SAME(s.uneven, solution.uneven, 18);
 	SAME(s.unshot.link, solution.unshot.link, 6);
 	SAME(s.ledger, solution.ledger, LEDGER_TERMS * 3);
 	model_free(&m);
