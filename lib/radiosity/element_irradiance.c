@@ -273,6 +273,15 @@ static void set_feed(const struct element_pass *pass, uint32_t row, uint64_t b, 
 	                                      lanes_f32);
 }
 
+/* Whether a block has flux of an origin, in any channel. */
+static int carries(const struct element_pass *pass, int origin, uint64_t b)
+{
+	for (size_t c = 0; c < pass->channels; c++)
+		if (pass->block_flux[origin][b * pass->channels + c] != 0)
+			return 1;
+	return 0;
+}
+
 /* The mean of what rows that light straight are worth over their rays, by the variance that each has:
  * one number for all, as only an error depends on it. */
 static void set_ideal(struct element_pass *pass)
@@ -282,8 +291,7 @@ static void set_ideal(struct element_pass *pass)
 
 	for (uint32_t row = 0; row < t->rows; row++) {
 		uint64_t b = t->row_block[row];
-		const double *from_emitter = pass->block_flux[0] + b * pass->channels + pass->first;
-		int other = part_of(t, row, 0) != DIRECT || !(from_emitter[0] > 0);
+		int other = part_of(t, row, 0) != DIRECT || !carries(pass, 0, b);
 		lanes v = variance_of(pass, row, b);
 		all[other] += v;
 		cast[other] += v * ((double)t->row_samples[row] / fmax(1, t->row_cast[row]));
