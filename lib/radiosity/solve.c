@@ -10,9 +10,9 @@
 /* Steps, a count, at most; a guess: each leaves a fifth to a twenty-fifth. */
 enum { STEPS = 16 };
 
-/* The fraction of a step that the next is taken to have where there is only one. A guess, the most
- * that was seen. */
-static const double usual_rate = .2;
+/* Of the standard error of irradiance, and of the irradiance, what it does not pay to put right.
+ * Guesses. */
+static const double beside_noise = .05, beside_all = 1e-3;
 
 static double mean_irradiance(const struct model *m, const struct solution *s)
 {
@@ -47,25 +47,27 @@ static int shoot_on(struct uneven *u, const struct radiosity_options *o,
 	return 0;
 }
 
-/* Steps until what is still to come is below o->stop, over the mean irradiance. *left: what is still to come, of the last. */
+/* Steps until what is still to come is small: as the last two say, else as much again. *left: that, of
+ * the last. Steps fall by this factor at worst, or are over. */
 static int correct(struct uneven *u, const struct radiosity_options *o,
                    const struct radiosity_hooks *hooks, struct radiosity_report *r, double *left,
                    struct err *e)
 {
+	static const double most = .9;
 	struct radiosity_options again = *o;
 	uint64_t before = u->s->shots;
-	double last = 0;
+	double noise = solution_relative_rms(u->t->m, u->s, u->s->error.sampling), last = 0;
+	double small = fmax(o->stop, fmin(beside_all, beside_noise * noise));
 
-	*left = usual_rate / (1 - usual_rate);
 	for (int i = 0; i < STEPS; i++) {
 		double step = radiosity_uneven_step(u), mean = mean_irradiance(u->t->m, u->s);
 		again.max_shots = o->max_shots - (u->s->shots - before);
 		if (shoot_on(u, &again, hooks, r, e))
 			return -1;
-		double rate = last > 0 ? fmin(.9, step / last) : usual_rate;
+		double rate = last > 0 ? fmin(most, step / last) : .5;
 		*left = rate / (1 - rate);
 		last = step;
-		if (*left * step <= o->stop * mean)
+		if (*left * step <= small * mean)
 			break;
 	}
 	return 0;

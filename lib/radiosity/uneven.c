@@ -332,7 +332,7 @@ double radiosity_uneven_step(struct uneven *u)
 {
 	struct solution *s = u->s;
 	const struct model *m = u->t->m;
-	size_t channels = solution_channels(s);
+	size_t channels = solution_channels(s), bands = (size_t)s->bands;
 	double squares = 0, area = 0;
 
 	memcpy(u->before, s->uneven, s->element_sides * channels * sizeof *s->uneven);
@@ -343,11 +343,15 @@ double radiosity_uneven_step(struct uneven *u)
 		if (!model_side_modelled(m, 2 * m->element.patch[es >> 1] + (uint32_t)(es & 1)))
 			continue;
 		area += part * s->bands;
-		for (size_t c = 0; c < channels; c++) {
-			size_t at = place_of(u, es, c);
-			double change = (double)s->uneven[at] - (double)u->before[at];
-			squares += part * change * change;
-			book(u, es, c, part * change);
+		for (size_t k = 0; k < bands; k++) {
+			double all = 0;
+			for (size_t c = k; c < channels; c += bands) {
+				size_t at = place_of(u, es, c);
+				double change = (double)s->uneven[at] - (double)u->before[at];
+				all += change;
+				book(u, es, c, part * change);
+			}
+			squares += part * all * all;
 		}
 	}
 	return area > 0 ? sqrt(squares / area) : 0;

@@ -53,7 +53,7 @@ int radiosity_uneven_init(struct uneven *u, const struct transport *t, struct so
 void radiosity_uneven_free(struct uneven *u);
 
 /* Finds u anew, by the irradiance that there is, and makes what changed unshot flux and entries of
- * the ledger. Returns the root mean square of the change over area. O(landings + elements). */
+ * the ledger. Returns the root mean square of the change over area and bands. O(landings + elements). */
 double radiosity_uneven_step(struct uneven *u);
 
 /* Adds to error.sampling what landings vary by, and fills error.uneven; `left`: the part of the last
