@@ -84,7 +84,7 @@ $(BUILD)/%.o: %.c
 	$(CC) $(CPPFLAGS) $(CFLAGS) -c -o $@ $<
 
 # Loops written to become vector code.
-FAST := ff_rays/ray_samples geometry/cubature_pair geometry/exchange_unoccluded geometry/cubature occlusion/exchange \
+FAST := hemicube/hemicube_render ff_rays/ray_samples geometry/cubature_pair geometry/exchange_unoccluded geometry/cubature occlusion/exchange \
 	occlusion/shadow_edges occlusion/occluder occlusion/visible_region occlusion/shaft geometry/point_polygon \
 	geometry/facet ff/exchange_matrix ff_tally/ff_batch interpolate/reconstruct interpolate/reconstruct_fit \
 	radiosity/propagate radiosity/truncation_bound radiosity/shoot radiosity/element_irradiance radiosity/gmres

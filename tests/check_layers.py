@@ -7,7 +7,7 @@ LAYERS = {
     "lib/data": "base",
     "lib/geometry": "base",
     "lib/scatter": "base data",
-    "lib/hemicube": "base data",
+    "lib/hemicube": "base data ray",
     "lib/interpolate": "base data",
     "lib/picture": "base data",
     "lib/ray": "base data scatter",

@@ -103,7 +103,7 @@ int ff_job_prepare(struct ff_job *j, int patches, struct err *e)
 	int formula = patches && ff_by_formula(&j->o), cubes = patches && j->o.method == FF_HEMICUBE;
 
 	if (cubes && (ff_hemicube_grid_init(&j->grid, (int)j->o.rays, e) ||
-	              !(j->cubes = ff_hemicube_scene_new(j->m, e))))
+	              !(j->cubes = ff_hemicube_scene_new(j->m, &j->locator, e))))
 		return -1;
 	if (formula && ff_formula_init(&j->formula, j->m, j->o.method == FF_ANALYTIC, e))
 		return -1;

@@ -124,24 +124,38 @@ static void capture_pixel(struct ff_thread *t, uint32_t ps, const struct ff_inci
 		mem_append(&t->incident, &c, 1, sizeof c, &t->tally.err);
 }
 
-static void gather_pixel(struct ff_thread *t, uint32_t i, uint32_t from, size_t pixel, double w,
-                         struct gathering *g)
+/* 1 if where a pixel's light lands is all there is to tell of it. */
+static int lands_only(const struct ff_job *j, uint32_t from, uint32_t item)
+{
+	if (item == HEMICUBE_VOID)
+		return 1;
+	uint32_t ps = 2 * j->m->element.patch[item >> 1] + (item & 1);
+	return j->is_black[ps] || !(j->is_ideal[ps] || j->has_lobe[ps] || j->has_lobe[from]);
+}
+
+/* Neighbouring pixels that show the same, w their factor. */
+static void land(struct ff_thread *t, uint32_t item, double w)
+{
+	const struct ff_job *j = t->job;
+
+	if (item == HEMICUBE_VOID)
+		ff_tally_rest(&t->tally, 0)->escape += w;
+	else if (j->is_black[2 * j->m->element.patch[item >> 1] + (item & 1)])
+		ff_tally_rest(&t->tally, 0)->black += w;
+	else
+		ff_tally_hit(&t->tally, 0, item, w, NULL);
+}
+
+/* A pixel whose light keeps its direction, there or on its way back. */
+static void gather_pixel(struct ff_thread *t, uint32_t i, uint32_t from, size_t pixel, uint32_t item,
+                         double w, struct gathering *g)
 {
 	const struct ff_job *j = t->job;
 	const struct view *v = &t->view[2 * i + (from & 1)];
-	uint32_t item = items(t, i, (int)(from & 1))[pixel];
-	uint32_t ps = item == HEMICUBE_VOID ? 0 : 2 * j->m->element.patch[item >> 1] + (item & 1);
+	uint32_t ps = 2 * j->m->element.patch[item >> 1] + (item & 1);
 	double dir[3];
 
 	to_world(v, &j->grid.direction[3 * pixel], dir);
-	if (item == HEMICUBE_VOID) {
-		ff_tally_rest(&t->tally, 0)->escape += w;
-		return;
-	}
-	if (j->is_black[ps]) {
-		ff_tally_rest(&t->tally, 0)->black += w;
-		return;
-	}
 	ff_tally_hit(&t->tally, 0, item, w, dir);
 	if (!j->is_ideal[ps] && !j->has_lobe[from])
 		return;
@@ -157,12 +171,23 @@ static void gather_pixel(struct ff_thread *t, uint32_t i, uint32_t from, size_t 
 static void gather(struct ff_thread *t, uint32_t ps)
 {
 	const struct ff_job *j = t->job;
+	const double *delta = j->grid.delta;
 	struct gathering g = { 0 };
 	double share = 1. / j->o.points;
 
 	for (uint32_t i = 0; i < j->o.points; i++) {
-		for (size_t k = 0; k < j->grid.pixels; k++)
-			gather_pixel(t, i, ps, k, share * j->grid.delta[k], &g);
+		const uint32_t *item = items(t, i, (int)(ps & 1));
+		for (size_t k = 0, first; k < j->grid.pixels;) {
+			double sum = 0;
+			for (first = k; k < j->grid.pixels && item[k] == item[first]; k++)
+				sum += delta[k];
+			if (lands_only(j, ps, item[first]))
+				land(t, item[first], share * sum);
+			else
+				for (size_t pixel = first; pixel < k; pixel++)
+					gather_pixel(t, i, ps, pixel, item[pixel],
+					             share * delta[pixel], &g);
+		}
 		if ((i + 1) * GROUPS % j->o.points == 0)
 			ff_tally_replicate(&t->tally);
 	}

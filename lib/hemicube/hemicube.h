@@ -16,6 +16,7 @@
 
 #include "lib/base/err.h"
 #include "lib/data/model.h"
+#include "lib/ray/locate.h"
 
 #define HEMICUBE_VOID 0xffffffffu  /* a pixel that sees nothing; no element */
 /* Pixels along an edge, at most: so that numbers of pixels fit 32 bits and an item buffer memory. */
@@ -42,8 +43,10 @@ size_t ff_hemicube_lookup(const struct hemicube_grid *g, const double direction[
 /* All elements of a model, arranged for drawing. */
 struct hemicube_scene;
 
-/* O(elements log elements). m must outlive it. NULL and e on failure. */
-struct hemicube_scene *ff_hemicube_scene_new(const struct model *m, struct err *e);
+/* O(elements log elements). m and its locator must outlive it; without a locator (NULL)
+ * elements are drawn, never input triangles. NULL and e on failure. */
+struct hemicube_scene *ff_hemicube_scene_new(const struct model *m, const struct locator *locator,
+                                             struct err *e);
 void ff_hemicube_scene_free(struct hemicube_scene *s);
 
 struct hemicube_work;
@@ -68,7 +71,7 @@ void ff_hemicube_free(struct hemicube *h);
  * than the rounding of world coordinates blocks.
  * Where elements are many more than input triangles, and more than the pixels are
  * worth, the triangles are drawn (without own's) and each pixel's element is found
- * in them. O(elements + pixels), or O(triangles + pixels log elements); what is
+ * in them. O(elements + pixels), or O(triangles + pixels); what is
  * below the horizon or behind nearer things is passed over. No allocation. */
 void ff_hemicube_render(struct hemicube *h, const struct hemicube_scene *s, const double eye[3],
                         const double frame[3][3], uint32_t own);

@@ -256,10 +256,9 @@ static void render_cluster(const struct drawing *g, struct hemicube_work *w,
 	}
 }
 
-static void draw_mesh(struct hemicube *h, const struct hemicube_mesh *s, const double eye[3],
-                      const double frame[3][3], uint32_t own)
+static void draw_mesh(struct hemicube *h, struct drawing *g)
 {
-	struct drawing g = { .s = s, .eye = eye, .frame = frame, .own = own };
+	const struct hemicube_mesh *s = g->s;
 	size_t tiles = ff_hemicube_tiles(h->grid->n) * (ff_hemicube_tiles(h->grid->n) +
 	                                                4 * ff_hemicube_tiles(h->grid->n / 2));
 	int32_t stack[64];
@@ -270,71 +269,150 @@ static void draw_mesh(struct hemicube *h, const struct hemicube_mesh *s, const d
 	memset(h->work->far, 0, tiles * sizeof *h->work->far);
 	h->work->drawn = 0;
 	for (int k = 0; k < 5; k++)
-		g.target[k] = target_face(h, k);
+		g->target[k] = target_face(h, k);
 	if (s->clusters)
 		stack[depth++] = s->root;
 	while (depth > 0) {
 		int32_t at = stack[--depth];
 		if (at >= 0) { /* the child on the eye's side first */
 			const struct hemicube_split *p = &s->split[at];
-			int near = eye[p->axis] >= p->at;
+			int near = g->eye[p->axis] >= p->at;
 			stack[depth++] = p->child[!near];
 			stack[depth++] = p->child[near];
 			continue;
 		}
-		render_cluster(&g, h->work, &s->cluster[~at]);
+		render_cluster(g, h->work, &s->cluster[~at]);
 		/* Noting the tiles costs about as much as drawing this many triangles. */
 		if (h->work->drawn * 16 > h->grid->pixels) {
 			for (int k = 0; k < 5; k++)
-				note_far(&g.target[k]);
+				note_far(&g->target[k]);
 			h->work->drawn = 0;
 		}
 	}
 }
 
-/* Turns input triangles into elements. The weight of a corner along direction d is
- * proportional to d.(q x r), q and r the other corners as seen from the eye. */
-static void find_elements(struct hemicube *h, const struct model *m, const double eye[3],
-                          const double frame[3][3])
-{
-	uint32_t known = HEMICUBE_VOID;
-	double side[3][3]; /* the three products of triangle `known`, cube's frame */
+/* The weights of corners 1 and 2 of a triangle, and the sum of all three, up to a factor, as
+ * affine functions of the column along a row of pixels. */
+struct row_weights {
+	double at[3], step[3];
+};
 
-	for (size_t i = 0; i < h->grid->pixels; i++) {
-		uint32_t item = h->item[i];
-		if (item == HEMICUBE_VOID)
-			continue;
-		if (item >> 1 != known) {
-			known = item >> 1;
-			double v[3][3], d[3];
-			for (int k = 0; k < 3; k++) {
-				v3_sub(&m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)known + (size_t)k]],
-				       eye, d);
-				for (int c = 0; c < 3; c++)
-					v[k][c] = v3_dot(frame[c], d);
-			}
-			for (int k = 0; k < 3; k++)
-				v3_cross(v[(k + 1) % 3], v[(k + 2) % 3], side[k]);
-		}
-		const double *d = &h->grid->direction[3 * i];
-		double w[3] = { v3_dot(side[0], d), v3_dot(side[1], d), v3_dot(side[2], d) };
-		double sum = w[0] + w[1] + w[2];
-		for (int k = 0; k < 3; k++)
-			w[k] /= sum;
-		h->item[i] = 2 * model_locate(m, known, w) + (item & 1);
+static const struct hemicube_found *find_triangle(struct hemicube_work *w, const struct drawing *g,
+                                                  const struct model *m, uint32_t triangle)
+{
+	struct hemicube_found *f = &w->found[triangle % HEMICUBE_FOUND];
+	double v[3][3], d[3], first[3];
+
+	if (f->triangle == triangle)
+		return f;
+	f->triangle = triangle;
+	for (int k = 0; k < 3; k++) {
+		v3_sub(&m->vertex[3 * (size_t)m->triangle.corner[3 * (size_t)triangle + (size_t)k]],
+		       g->eye, d);
+		for (int c = 0; c < 3; c++)
+			v[k][c] = v3_dot(g->frame[c], d);
 	}
+	v3_cross(v[1], v[2], first);
+	v3_cross(v[2], v[0], f->side[0]);
+	v3_cross(v[0], v[1], f->side[1]);
+	for (int c = 0; c < 3; c++)
+		f->side[2][c] = first[c] + f->side[0][c] + f->side[1][c];
+	return f;
 }
+
+/* Along the row at height y of a face, column 0 at x0, in units of the face's distance. */
+static struct row_weights weights_along(const struct hemicube_found *f, const struct face *face, double x0,
+                                        double pixel, double y)
+{
+	struct row_weights w;
+
+	for (int k = 0; k < 3; k++) {
+		const double *p = f->side[k];
+		w.step[k] = face->su * p[face->u] * pixel;
+		w.at[k] = face->su * p[face->u] * x0 + p[face->v] * y + face->sw * p[face->w];
+	}
+	return w;
+}
+
+/* Some pixels of a row while their elements are found. */
+enum { AT_ONCE = 64 };
+struct finding {
+	float x[AT_ONCE], y[AT_ONCE]; /* weights of the triangle's corners 1 and 2 */
+	int32_t at[AT_ONCE];          /* a node of its split tree, or ~element */
+};
+
+/* Where pixels [i, end), all of one triangle, which begin at column `first` of the row, are in
+ * the triangle's table. Nothing here depends on what the table says, so the memory of many
+ * pixels is asked for together. */
+static void look_up(const struct locator *l, uint32_t triangle, const struct row_weights *w,
+                    int first, int i, int end, struct finding *p)
+{
+	for (int k = i; k < end; k++) {
+		double at = first + k, whole = 1 / (w->at[2] + w->step[2] * at);
+		p->x[k] = (float)((w->at[0] + w->step[0] * at) * whole);
+		p->y[k] = (float)((w->at[1] + w->step[1] * at) * whole);
+	}
+	for (int k = i; k < end; k++)
+		p->at[k] = *ray_locate_begin(l, triangle, p->x[k], p->y[k]);
+}
+
+/* Turns the input triangles of n pixels of a row at height y into elements. */
+static void find_pixels(struct hemicube_work *work, const struct drawing *g, int k,
+                        const struct hemicube_scene *s, double y, int first, int n, uint32_t *item)
+{
+	const double pixel = g->target[k].pixel;
+	const struct locator *l = s->locator;
+	struct finding p;
+
+	for (int i = 0, end; i < n; i = end) {
+		uint32_t triangle = item[i] >> 1;
+		for (end = i + 1; end < n && item[end] >> 1 == triangle;)
+			end++;
+		if (item[i] == HEMICUBE_VOID)
+			continue;
+		struct row_weights w = weights_along(find_triangle(work, g, s->m, triangle), &faces[k],
+		                                     .5 * pixel - 1, pixel, y);
+		look_up(l, triangle, &w, first, i, end, &p);
+	}
+	for (int i = 0; i < n; i++)
+		if (item[i] != HEMICUBE_VOID)
+			item[i] = 2 * ray_locate_below(l, p.at[i], p.x[i], p.y[i]) + (item[i] & 1);
+}
+
+/* Turns the input triangles of a face into elements, O(1) a pixel. */
+static void find_elements(struct hemicube_work *work, const struct drawing *g, int k,
+                          const struct hemicube_scene *s)
+{
+	const struct hemicube_target *t = &g->target[k];
+
+	for (int row = 0; row < t->rows; row++)
+		for (int i = 0; i < t->columns; i += AT_ONCE)
+			find_pixels(work, g, k, s, (row + .5 - t->centre_row) * t->pixel, i,
+			            min_i(AT_ONCE, t->columns - i),
+			            t->item + (size_t)row * (size_t)t->columns + i);
+}
+
+/* Pixels whose element is found in the time that drawing an element takes: tests/bench/hemicube.c
+ * measures both. */
+enum { FOUND_A_DRAWN = 8 };
 
 void ff_hemicube_render(struct hemicube *h, const struct hemicube_scene *s, const double eye[3],
                         const double frame[3][3], uint32_t own)
 {
 	const struct hemicube_mesh *t = &s->triangles;
+	struct drawing g = { .s = t, .eye = eye, .frame = frame, .own = own };
+	int by_element = !t->triangles || (s->elements.triangles - t->triangles) * FOUND_A_DRAWN <=
+	                                  h->grid->pixels;
 
-	/* To find a pixel's element takes about as long as to draw two. */
-	if (!t->triangles || s->elements.triangles - t->triangles <= 2 * h->grid->pixels) {
-		draw_mesh(h, &s->elements, eye, frame, own);
+	if (by_element)
+		g.s = &s->elements;
+	else if (own != HEMICUBE_VOID)
+		g.own = s->m->element.triangle[own];
+	draw_mesh(h, &g);
+	if (by_element)
 		return;
-	}
-	draw_mesh(h, t, eye, frame, own == HEMICUBE_VOID ? own : s->m->element.triangle[own]);
-	find_elements(h, s->m, eye, frame);
+	for (int i = 0; i < HEMICUBE_FOUND; i++)
+		h->work->found[i].triangle = HEMICUBE_VOID;
+	for (int k = 0; k < 5; k++)
+		find_elements(h->work, &g, k, s);
 }

@@ -252,15 +252,17 @@ static void ff_hemicube_mesh_free(struct hemicube_mesh *s)
 	*s = (struct hemicube_mesh){ 0 };
 }
 
-struct hemicube_scene *ff_hemicube_scene_new(const struct model *m, struct err *e)
+struct hemicube_scene *ff_hemicube_scene_new(const struct model *m, const struct locator *locator,
+                                             struct err *e)
 {
 	struct hemicube_scene *s = mem_new(1, sizeof *s, "hemicube scene", e);
 
 	if (!s)
 		return NULL;
 	s->m = m;
+	s->locator = locator;
 	/* Hardly subdivided: the elements are as good as the triangles. */
-	size_t n = m->triangle.n > m->element.n / 2 ? 0 : m->triangle.n;
+	size_t n = !locator || m->triangle.n > m->element.n / 2 ? 0 : m->triangle.n;
 	if (ff_hemicube_mesh_init(&s->elements, m, m->element.corner, m->element.n, e) ||
 	    ff_hemicube_mesh_init(&s->triangles, m, m->triangle.corner, n, e)) {
 		ff_hemicube_scene_free(s);

@@ -9,6 +9,7 @@
 
 #include "lib/base/err.h"
 #include "lib/data/model.h"
+#include "lib/ray/locate.h"
 
 /* Counts: a cluster of 32 is drawn with its vertices in registers and cache. A guess;
  * tests/bench/hemicube.c measures drawing. */
@@ -46,7 +47,19 @@ struct hemicube_mesh {
  * triangles, with the elements found pixel by pixel afterwards. */
 struct hemicube_scene {
 	const struct model *m;
+	const struct locator *locator;
 	struct hemicube_mesh elements, triangles; /* triangles may be empty */
+};
+
+/* Triangles whose weights a hemicube keeps at a time: a count; tests/bench/hemicube.c measures
+ * finding elements. */
+enum { HEMICUBE_FOUND = 256 };
+
+/* Weights of a triangle: that of a corner along direction d is proportional to d.(q x r), q
+ * and r the other corners as seen from the eye. */
+struct hemicube_found {
+	uint32_t triangle;         /* HEMICUBE_VOID: none */
+	double side[3][3];         /* q x r of corners 1 and 2, and the sum of all, cube's frame */
 };
 
 /* Floats of an AVX2 register. */
@@ -62,6 +75,7 @@ struct hemicube_work {
 	float *far;                /* least depth in each tile of HEMICUBE_LANES^2 pixels,
 	                              some time ago */
 	size_t drawn;              /* triangles since */
+	struct hemicube_found found[HEMICUBE_FOUND]; /* by the number's last bits */
 };
 
 /* Tiles of the top face, and then of each side. */

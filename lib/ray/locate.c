@@ -23,8 +23,21 @@ static uint32_t grid_size(uint32_t k)
 	return n;
 }
 
+/* The barycentric weights of a node as affine functions of the weights (w1, w2) of the
+ * whole triangle: weight c = a[c] + b[c] w1 + d[c] w2. */
+struct weights {
+	double a[3], b[3], d[3];
+};
+
+/* A table being made. */
+struct filling {
+	struct locator *l;
+	struct weights *of;          /* [splits] */
+	struct array stack;          /* int32_t nodes to visit */
+};
+
 /* The functions of a child from those of its parent, as model_locate halves weights. */
-static void halve(struct locator_node *n, const struct split *s, int second)
+static void halve(struct weights *n, const struct split *s, int second)
 {
 	int a = s->edge, b = a == 2 ? 0 : a + 1;
 	int keep = second ? b : a, twice = second ? a : b;
@@ -37,27 +50,38 @@ static void halve(struct locator_node *n, const struct split *s, int second)
 	n->d[twice] *= 2;
 }
 
-/* The functions of every node below a triangle's root. Children follow parents in no
- * special order, so a stack of nodes to visit is kept. */
-static int fill_nodes(struct locator *l, struct array *stack, uint32_t tri, struct err *e)
+/* The node of a split whose weights are known. */
+static struct locator_node node_of(const struct split *s, const struct weights *w)
 {
+	int a = s->edge, b = a == 2 ? 0 : a + 1;
+
+	return (struct locator_node){ (float)(w->a[a] - w->a[b]), (float)(w->b[a] - w->b[b]),
+	                              (float)(w->d[a] - w->d[b]), { s->child[0], s->child[1] } };
+}
+
+/* Every node below a triangle's root. Children follow parents in no special order, so a
+ * stack of nodes to visit is kept. */
+static int fill_nodes(struct filling *f, uint32_t tri, struct err *e)
+{
+	struct locator *l = f->l;
 	int32_t at = l->m->triangle.split[tri];
 
 	if (at < 0)
 		return 0;
-	l->node[at] = (struct locator_node){ { 1, 0, 0 }, { -1, 1, 0 }, { -1, 0, 1 } };
-	stack->n = 0;
-	if (mem_append(stack, &at, 1, sizeof at, e))
+	f->of[at] = (struct weights){ { 1, 0, 0 }, { -1, 1, 0 }, { -1, 0, 1 } };
+	f->stack.n = 0;
+	if (mem_append(&f->stack, &at, 1, sizeof at, e))
 		return -1;
-	while (stack->n) {
-		at = ((int32_t *)stack->data)[--stack->n];
+	while (f->stack.n) {
+		at = ((int32_t *)f->stack.data)[--f->stack.n];
 		const struct split *s = &l->m->split[at];
+		l->node[at] = node_of(s, &f->of[at]);
 		for (int k = 0; k < 2; k++) {
 			if (s->child[k] < 0)
 				continue;
-			l->node[s->child[k]] = l->node[at];
-			halve(&l->node[s->child[k]], s, k);
-			if (mem_append(stack, &s->child[k], 1, sizeof at, e))
+			f->of[s->child[k]] = f->of[at];
+			halve(&f->of[s->child[k]], s, k);
+			if (mem_append(&f->stack, &s->child[k], 1, sizeof at, e))
 				return -1;
 		}
 	}
@@ -72,7 +96,7 @@ struct square {
 };
 
 /* The weights that the corners of a square have in a node. Returns how many there are. */
-static int square_weights(const struct locator_node *f, const struct square *q, double w[4][3])
+static int square_weights(const struct weights *f, const struct square *q, double w[4][3])
 {
 	const double in = 1e-6; /* of a cell: a guess, above rounding, below any element */
 	int corners = 0;
@@ -91,13 +115,13 @@ static int square_weights(const struct locator_node *f, const struct square *q, 
 
 /* The deepest node below `at`, or the element, that holds all of a square: its corners go
  * down the tree together for as long as they agree. */
-static int32_t square_node(const struct locator *l, int32_t at, const struct square *q)
+static int32_t square_node(const struct filling *f, int32_t at, const struct square *q)
 {
 	double w[4][3];
-	int corners = square_weights(&l->node[at], q, w);
+	int corners = square_weights(&f->of[at], q, w);
 
 	while (at >= 0 && corners) {
-		const struct split *s = &l->m->split[at];
+		const struct split *s = &f->l->m->split[at];
 		int a = s->edge, b = a == 2 ? 0 : a + 1, second = w[0][a] < w[0][b];
 		for (int k = 1; k < corners; k++)
 			if ((w[k][a] < w[k][b]) != second)
@@ -114,10 +138,10 @@ static int32_t square_node(const struct locator *l, int32_t at, const struct squ
 
 /* Fills the cells of a square that lies in node `at`: a quarter at a time from the deepest
  * node that holds it. */
-static void fill_square(const struct locator *l, int32_t *cell, int32_t at, struct square q)
+static void fill_square(const struct filling *f, int32_t *cell, int32_t at, struct square q)
 {
 	if (at >= 0)
-		at = square_node(l, at, &q);
+		at = square_node(f, at, &q);
 	if (at < 0 || q.size == 1) {
 		for (uint32_t j = q.j; j < q.j + q.size; j++)
 			for (uint32_t i = q.i; i < q.i + q.size; i++)
@@ -126,25 +150,26 @@ static void fill_square(const struct locator *l, int32_t *cell, int32_t at, stru
 	}
 	q.size /= 2;
 	for (uint32_t k = 0; k < 4; k++)
-		fill_square(l, cell, at, (struct square){ q.n, q.i + (k & 1) * q.size,
+		fill_square(f, cell, at, (struct square){ q.n, q.i + (k & 1) * q.size,
 		                                          q.j + (k >> 1) * q.size, q.size });
 }
 
 static int fill(struct locator *l, struct err *e)
 {
-	struct array stack = { 0 };
-	int bad = 0;
+	struct filling f = { .l = l, .of = mem_new(l->m->splits, sizeof *f.of, "element lookup", e) };
+	int bad = !f.of;
 
 	for (uint32_t t = 0; !bad && t < l->m->triangle.n; t++) {
 		if (l->root[t] < 0)
 			continue;
 		const struct locator_grid *g = &l->grid[l->root[t]];
-		bad = fill_nodes(l, &stack, t, e);
+		bad = fill_nodes(&f, t, e);
 		if (!bad)
-			fill_square(l, l->cell + g->first, l->m->triangle.split[t],
+			fill_square(&f, l->cell + g->first, l->m->triangle.split[t],
 			            (struct square){ g->size, 0, 0, g->size });
 	}
-	free(stack.data);
+	free(f.of);
+	free(f.stack.data);
 	return bad;
 }
 

@@ -4,10 +4,12 @@
 
 #include "lib/data/model.h"
 
-/* The barycentric weights of a split tree's node as affine functions of the weights
- * (w1, w2) of the whole triangle: weight c = a[c] + b[c] w1 + d[c] w2. */
+/* A node of the split tree: which half a point is in, by the sign of a + b w1 + d w2, an affine
+ * function of the weights of corners 1 and 2 of the whole triangle. */
 struct locator_node {
-	float a[3], b[3], d[3];
+	float a, b, d;
+	int32_t child[2];            /* where it is not negative, and where it is: a node, or
+	                                ~element */
 };
 
 /* A grid over the (w1, w2) plane of a subdivided triangle: a cell names the element
@@ -48,22 +50,19 @@ static inline const int32_t *ray_locate_begin(const struct locator *l, uint32_t 
 	return &l->cell[g->first + (uint64_t)j * g->size + (uint64_t)i];
 }
 
+static inline int32_t ray_locate_step(const struct locator_node *node, float x, float y)
+{
+	return node->child[node->a + node->b * x + node->d * y < 0];
+}
+
 static inline uint32_t ray_locate_below(const struct locator *l, int32_t at, float x, float y)
 {
-	if (at < 0)
-		return (uint32_t)~at;
-	const struct locator_node *node = &l->node[at];
-	float v[3];
-	for (int c = 0; c < 3; c++)
-		v[c] = node->a[c] + node->b[c] * x + node->d[c] * y;
-	while (at >= 0) {
-		const struct split *s = &l->m->split[at];
-		int a = s->edge, b = a == 2 ? 0 : a + 1, second = v[a] < v[b];
-		float low = second ? v[a] : v[b], high = second ? v[b] : v[a];
-		v[second ? b : a] = high - low;
-		v[second ? a : b] = 2 * low;
-		at = s->child[second];
-	}
+	/* Whether a cell names an element cannot be foreseen, so the first step has no branch. */
+	int32_t named = at >> 31, below = ray_locate_step(&l->node[at & ~named], x, y);
+
+	at = (at & named) | (below & ~named);
+	while (at >= 0)
+		at = ray_locate_step(&l->node[at], x, y);
 	return (uint32_t)~at;
 }
 

@@ -19,7 +19,7 @@ static double seconds(void)
 {
 	struct timespec t;
 
-	clock_gettime(CLOCK_MONOTONIC, &t);
+	clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
 	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
@@ -165,7 +165,10 @@ static void measure(const char *name, const struct model *m, int n, size_t repea
 	struct rng r = rng_seed(1, 1);
 	double *render = must(malloc(repeats * sizeof *render)), begun = seconds();
 	double escape = 0;
-	struct hemicube_scene *s = ff_hemicube_scene_new(m, &e);
+	struct locator locator = { 0 };
+	int find = m->triangle.n > 0;
+	struct hemicube_scene *s = !find || !ray_locator_init(&locator, m, &e)
+	                         ? ff_hemicube_scene_new(m, find ? &locator : NULL, &e) : NULL;
 
 	printf("build_ms.%s %.1f\n", name, 1e3 * (seconds() - begun));
 	if (!s || ff_hemicube_grid_init(&g, n, &e) || ff_hemicube_init(&h, &g, &e)) {
@@ -192,6 +195,7 @@ static void measure(const char *name, const struct model *m, int n, size_t repea
 	ff_hemicube_free(&h);
 	ff_hemicube_grid_free(&g);
 	ff_hemicube_scene_free(s);
+	ray_locator_free(&locator);
 	free(render);
 }
 
@@ -206,7 +210,7 @@ static int measure_file(const char *path, size_t repeats)
 		return 1;
 	}
 	printf("elements.file %zu\n", m.element.n);
-	for (int n = 64; n <= 512; n *= 2)
+	for (int n = 32; n <= 512; n *= 2)
 		measure("file", &m, n, repeats);
 	file_cache_info_free(&info);
 	model_free(&m);

@@ -77,17 +77,22 @@ static struct model cube_model(const double lo[3], double size)
 /* Everything needed to draw a model at resolution n. */
 struct stage {
 	struct hemicube_grid grid;
+	struct locator *locator;
 	struct hemicube_scene *scene;
 	struct hemicube cube;
 };
 
+/* Input triangles are drawn where the model has any. */
 static struct stage stage_new(const struct model *m, int n)
 {
 	struct err e = { 0 };
-	struct stage s = { 0 };
+	struct stage s = { .locator = calloc(1, sizeof *s.locator) };
 
+	assert_non_null(s.locator);
+	if (m->triangle.n)
+		assert_int_equal(ray_locator_init(s.locator, m, &e), 0);
 	assert_int_equal(ff_hemicube_grid_init(&s.grid, n, &e), 0);
-	s.scene = ff_hemicube_scene_new(m, &e);
+	s.scene = ff_hemicube_scene_new(m, m->triangle.n ? s.locator : NULL, &e);
 	assert_non_null(s.scene);
 	return s;
 }
@@ -105,6 +110,8 @@ static void stage_free(struct stage *s)
 {
 	ff_hemicube_free(&s->cube);
 	ff_hemicube_scene_free(s->scene);
+	ray_locator_free(s->locator);
+	free(s->locator);
 	ff_hemicube_grid_free(&s->grid);
 }
 
