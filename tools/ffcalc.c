@@ -23,6 +23,7 @@ struct request {
 static const char *const methods[] = { "rays", "hemicube", "analytic", "auto", NULL };
 static const char *const receivers[] = { "elements", "patches", NULL };
 static const char *const sources[] = { "rays", "centroid", NULL };
+static const char *const papers[] = { "no", "printed", "closed", NULL };
 static const char *const precisions[] = { "f32", "f64", NULL };
 
 static const struct option_spec options[] = {
@@ -30,6 +31,9 @@ static const struct option_spec options[] = {
 	  .role = OPTION_ASIDE },
 	{ 'm', "method", "METHOD", "auto, rays, hemicube or analytic (default %s)",
 	  WORD(ff.method, methods) },
+	{ 0, "paper", "[=HOW]",
+	  "the paper's algorithm, as printed or, closed, with what escapes in the sum of eq. (3)",
+	  WORD(ff.paper, papers) },
 	{ 'n', "samples", "N",
 	  "rays a patch-side (default 4096), or pixels along a hemicube's edge (64)",
 	  INTEGER(ff.rays, 4, 1 << 26) },
@@ -63,6 +67,21 @@ static const struct option_spec options[] = {
 	{ 0 }
 };
 
+/* What the paper's algorithm has no place for. */
+static void refuse_with_paper(const struct cli *c, const struct ff_options *o)
+{
+	static const char *const other[] = { "points", "target", "close", "to", "emitter-gain", "gather",
+	                                     "lobe-rays", "links", "lobe-depth", "depth" };
+
+	if (!o->paper)
+		return;
+	if (options_given(c, "method") && o->method != FF_HEMICUBE)
+		cli_usage(c, "--paper is by hemicubes: leave out -m %s", methods[o->method]);
+	for (size_t i = 0; i < sizeof other / sizeof *other; i++)
+		if (options_given(c, other[i]))
+			cli_usage(c, "--paper leaves nothing to --%s: leave one of them out", other[i]);
+}
+
 static void settle(struct cli *c, int operand, struct request *r)
 {
 	struct ff_options *o = &r->ff;
@@ -74,6 +93,7 @@ static void settle(struct cli *c, int operand, struct request *r)
 		cli_usage(c, "an output is needed: -o FILE.ff");
 	r->mesh = c->argv[operand];
 	cli_keep_input(c, r->output, r->mesh);
+	refuse_with_paper(c, o);
 	if (ff_options_complete(o, &contradiction))
 		cli_usage(c, "%s", contradiction.text);
 	o->shard = r->shard[0];
@@ -95,6 +115,8 @@ static json_t *options_json(const struct ff_options *o)
 	json_object_set_new(j, "emitter_gain", json_integer(o->emitter_gain));
 	json_object_set_new(j, "links", json_string(sources[o->centroid]));
 	json_object_set_new(j, "lobe_depth", json_integer(o->lobe_depth));
+	if (o->paper)
+		json_object_set_new(j, "paper", json_string(papers[o->paper]));
 	if (o->to_patches)
 		json_object_set_new(j, "to", json_string("patches"));
 	if (o->close)
@@ -174,13 +196,16 @@ static int compute(struct cli *c, const struct request *r, const struct model *m
 	struct ff_sink sink = { put, w };
 	struct ff_stats stats;
 	struct ff whole = { 0 };
+	struct model lobes = { 0 };
 	struct cli_progress bar;
 	double begun = cli_seconds();
 
 	if (!w)
 		return -1;
 	struct progress progress = cli_progress_begin(&bar, c, "form factors");
-	int bad = ff_build(m, &r->ff, &whole, &stats, &sink, &progress, e);
+	int bad = r->ff.paper && model_ideal_as_lobes(m, &lobes, e);
+	bad = bad || ff_build(r->ff.paper ? &lobes : m, &r->ff, &whole, &stats, &sink, &progress, e);
+	model_lobes_free(&lobes);
 	cli_progress_end(&bar);
 	if (bad) {
 		file_ff_abandon(w);

@@ -22,7 +22,7 @@ struct request {
 	const char *mesh, *output, *log;
 	char *const *ff;
 	size_t shards;
-	int resume, light_groups;
+	int resume, light_groups, paper;
 	struct radiosity_options solve;
 };
 
@@ -33,6 +33,7 @@ static const struct option_spec options[] = {
 	  .role = OPTION_ASIDE },
 	{ 'e', "stop", "X", "stop when unshot / emitted flux is X everywhere (default 1e-4)",
 	  NUMBER(solve.stop, 0, 1) },
+	{ 0, "paper", NULL, "the paper's algorithm, with form factors of ffcalc --paper", FLAG(paper) },
 	{ 'n', "shots", "N", "stop after N shots", INTEGER(solve.max_shots, 0, INT64_MAX) },
 	{ 0, "light-groups", NULL, "keep the light of each emitting material apart",
 	  FLAG(light_groups) },
@@ -92,6 +93,21 @@ static void sort_shards(struct job *j)
 		j->ff[i] = &j->file[i].f;
 }
 
+/* The paper's form factors have no chains: ideal surfaces are lobes in them. */
+static int check_paper(const struct job *j, const struct ff_file *f, const char *name,
+                       struct err *e)
+{
+	json_t *made_by = json_loads(f->info.options ? f->info.options : "{}", 0, NULL);
+	int is_paper = json_object_get(made_by, "paper") != NULL;
+
+	json_decref(made_by);
+	if (is_paper && !j->r->paper)
+		return err_set(e, "%s: made by ffcalc --paper; give --paper here, too", name);
+	if (!is_paper && j->r->paper)
+		return err_set(e, "%s: not made by ffcalc --paper, which --paper needs", name);
+	return 0;
+}
+
 static int open_inputs(struct job *j, struct err *e)
 {
 	const struct request *r = j->r;
@@ -102,7 +118,8 @@ static int open_inputs(struct job *j, struct err *e)
 	if (!j->file || !j->ff || !j->name || file_mesh_read(r->mesh, &j->m, &j->mesh, e))
 		return -1;
 	for (size_t i = 0; i < r->shards; i++) {
-		if (file_ff_open(r->ff[i], &j->m, &j->mesh, &j->file[i], e))
+		if (file_ff_open(r->ff[i], &j->m, &j->mesh, &j->file[i], e) ||
+		    check_paper(j, &j->file[i], r->ff[i], e))
 			return -1;
 		j->name[i] = r->ff[i];
 	}
@@ -141,6 +158,8 @@ static char *options_text(const struct request *r)
 		json_object_set_new(o, "shots", json_integer((json_int_t)r->solve.max_shots));
 	if (r->light_groups)
 		json_object_set_new(o, "light-groups", json_true());
+	if (r->paper)
+		json_object_set_new(o, "paper", json_true());
 	if (r->resume)
 		json_object_set_new(o, "resume", json_true());
 	text = json_dumps(o, JSON_COMPACT | JSON_SORT_KEYS);
@@ -275,6 +294,17 @@ static int solve(struct job *j, struct err *e)
 	return 0;
 }
 
+/* Solves with ideal surfaces as lobes; the model in the solution stays as it is. */
+static int solve_paper(struct job *j, struct err *e)
+{
+	struct model as_is = j->m;
+	int bad = model_ideal_as_lobes(&as_is, &j->m, e) || solve(j, e);
+
+	model_lobes_free(&j->m);
+	j->m = as_is;
+	return bad;
+}
+
 /* ---- the report ---- */
 
 static const char *const term_name[LEDGER_TERMS] = { "emitted", "absorbed", "escaped", "lost",
@@ -398,7 +428,7 @@ static int make(struct job *j, struct err *e)
 {
 	if (j->r->log && !(j->log = fopen(j->r->log, "w")))
 		return err_set(e, "%s: cannot write the log", j->r->log);
-	int bad = solve(j, e);
+	int bad = j->r->paper ? solve_paper(j, e) : solve(j, e);
 	if (j->log && fclose(j->log) && !bad)
 		bad = err_set(e, "%s: cannot write the log", j->r->log);
 	if (bad)

@@ -41,6 +41,7 @@ struct trace {
 	int size[2];                /* of the picture, or 0 */
 	double eye[3], target[3], up[3], fov;
 	enum view_method method;
+	int paper;
 	double budget;              /* seconds for a picture; 0: not given */
 	struct view_options view;
 	struct exr_file_options exr;
@@ -82,6 +83,7 @@ static const struct option_spec option_table[] = {
 	  .role = OPTION_RECORDED },
 	{ 'd', "diffuse", "METHOD",
 	  "where diffuse light comes from: mesh, %s (default), gather", WORD(method, methods) },
+	{ 0, "paper", NULL, "the paper's pass 2: -d mesh, and lobes along their axes alone", FLAG(paper) },
 	{ 't', "error", "X", "relative standard error of pixels at which sampling stops",
 	  NUMBER(view.relative, 1e-6, 1) },
 	{ 0, "budget", "SECONDS", "as many samples and rays as fit in, for each picture",
@@ -126,6 +128,13 @@ static void settle(struct trace *t, int operand)
 	if (t->budget > 0 && (t->view.relative > 0 || options_given(c, "samples") ||
 	                      options_given(c, "gather-rays")))
 		cli_usage(c, "--budget goes without -t, --samples and --gather-rays, which it chooses");
+	if (t->paper && (options_given(c, "diffuse") || options_given(c, "lobe-samples") ||
+	                 options_given(c, "gather-rays")))
+		cli_usage(c, "--paper goes without -d, --lobe-samples and --gather-rays, which it sets");
+	if (t->paper) {
+		t->method = VIEW_MESH;
+		t->view.lobe_samples = 0;
+	}
 	if (!options_given(c, "samples") && t->view.relative > 0)
 		t->view.samples = TARGET_SAMPLES;
 	for (size_t i = 0; i < t->camera.n; i++)

@@ -50,6 +50,29 @@ int model_derive(struct model *m, struct err *e)
 	return model_lights_derive(m, e);
 }
 
+int model_ideal_as_lobes(const struct model *m, struct model *lobes, struct err *e)
+{
+	struct materials *mt = &lobes->material;
+
+	*lobes = *m;
+	mt->alpha = mem_new(2 * mt->n, sizeof *mt->alpha, "exponents", e);
+	mt->beta = mem_new(2 * mt->n, sizeof *mt->beta, "exponents", e);
+	if (!mt->alpha || !mt->beta)
+		return -1;
+	for (size_t i = 0; i < 2 * mt->n; i++) {
+		mt->alpha[i] = fmin(m->material.alpha[i], PAPER_IDEAL);
+		mt->beta[i] = fmin(m->material.beta[i], PAPER_IDEAL);
+	}
+	return 0;
+}
+
+void model_lobes_free(struct model *lobes)
+{
+	free(lobes->material.alpha);
+	free(lobes->material.beta);
+	*lobes = (struct model){ 0 };
+}
+
 int model_materials_new(struct materials *mt, size_t n, int bands, struct err *e)
 {
 	const size_t b = (size_t)bands;

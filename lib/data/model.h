@@ -156,6 +156,13 @@ static inline int model_side_modelled(const struct model *m, uint32_t patch_side
 	       !m->material.one_sided[model_patch_material(m, patch_side >> 1)];
 }
 
+/* The same model, but that infinite exponents are PAPER_IDEAL: mirrors and panes are the narrowest
+ * of lobes, as in the paper, which knows no others. All but the exponents stays m's, which must
+ * outlive it. 0, or -1 and e; model_lobes_free either way, in place of model_free. */
+#define PAPER_IDEAL 1e12
+int model_ideal_as_lobes(const struct model *m, struct model *lobes, struct err *e);
+void model_lobes_free(struct model *lobes);
+
 /* Allocates all arrays of n materials with `bands` bands (zero coefficients,
  * exponents infinite, emission exponents 1). 0, or -1 and e. */
 int model_materials_new(struct materials *mt, size_t n, int bands, struct err *e);

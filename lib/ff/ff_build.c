@@ -9,6 +9,7 @@
 #include "lib/ff/landings.h"
 #include "lib/ff/row_hemicube.h"
 #include "lib/ff/row_light.h"
+#include "lib/ff/row_paper.h"
 #include "lib/ff/row_rays.h"
 #include "lib/ff/row_reciprocal.h"
 #include "lib/ff_rays/ray_budget.h"
@@ -37,6 +38,8 @@ static void do_patches(void *arg, size_t begin, size_t end, int thread)
 		r->owner[i] = thread;
 		if (patch >= patches)
 			ff_light_row(&r->thread[thread], patch - patches, &r->batch[i], &r->err[i]);
+		else if (r->job->o.paper)
+			ff_patch_paper(&r->thread[thread], patch, &r->batch[i], &r->err[i]);
 		else if (r->job->o.method == FF_HEMICUBE)
 			ff_patch_hemicube(&r->thread[thread], patch, &r->batch[i], &r->err[i]);
 		else
@@ -236,6 +239,8 @@ int ff_build(const struct model *m, const struct ff_options *o, struct ff *whole
 	*whole = (struct ff){ .shard = o->shard, .shards = o->shards };
 	whole->patch_begin = share(m->patch.n, o->shard - 1, o->shards);
 	whole->patch_end = share(m->patch.n, o->shard, o->shards);
+	if (!bad && o->paper && m->lobe != LOBE_PAPER)
+		bad = err_set(e, "--paper needs the paper's lobes: run mesh with --lobe paper");
 	if (!bad && o->close && !matrix)
 		bad = err_set(e, "--close needs factors to patches by formula (-m auto --to patches) "
 		              "in a model without lobes, mirrors and panes");

@@ -149,7 +149,8 @@ int ff_thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e)
 	t->item = mem_new(2 * (size_t)j->o.points, j->grid.pixels * sizeof *t->item,
 	                  "hemicube items", e);
 	t->view = mem_new(2 * (size_t)j->o.points, sizeof *t->view, "hemicube views", e);
-	return t->item && t->view ? ff_hemicube_init(&t->cube, &j->grid, e) : -1;
+	t->weight = mem_new(j->grid.pixels, sizeof *t->weight, "hemicube lobes", e);
+	return t->item && t->view && t->weight ? ff_hemicube_init(&t->cube, &j->grid, e) : -1;
 }
 
 void ff_thread_free(struct ff_thread *t)
@@ -165,5 +166,6 @@ void ff_thread_free(struct ff_thread *t)
 	free(t->arrivals.data);
 	free(t->item);
 	free(t->view);
+	free(t->weight);
 	free(t->chain_map.data);
 }

@@ -144,6 +144,7 @@ struct ff_thread {
 	struct hemicube cube;
 	uint32_t *item;           /* hemicube: [points][2 sides][pixels] of the patch */
 	struct view *view;        /* hemicube: [points][2 sides] */
+	double *weight;           /* the paper's: [pixels] */
 	double rays;
 	struct array shares;      /* struct ff_share */
 	uint32_t boost;           /* weights of a row over its rays: ray_guide.h */

@@ -16,6 +16,11 @@ int ff_options_complete(struct ff_options *o, struct err *e)
 {
 	if (o->target == 0)
 		o->target = o->to_patches ? 1e-6 : 1e-4;
+	if (o->paper) {
+		o->method = FF_HEMICUBE;
+		o->points = 1;
+		o->centroid = 1;
+	}
 	if (o->centroid)
 		o->lobe_depth = 0;
 	if (o->method == FF_HEMICUBE) {

@@ -6,6 +6,10 @@
 
 #include "lib/base/err.h"
 
+/* The paper's algorithm as printed, or with eq. (3) summed over all that a lobe sees, what
+ * escapes included. */
+enum ff_paper { FF_PAPER_NO, FF_PAPER_PRINTED, FF_PAPER_CLOSED };
+
 enum ff_method { FF_RAYS, FF_HEMICUBE, FF_ANALYTIC, FF_AUTO };
 
 struct ff_options {
@@ -15,6 +19,7 @@ struct ff_options {
 	uint32_t emitter_gain;/* rays: this many times the rays for emitters */
 	uint32_t gather;      /* rays: that an element-side gathers with; 0: rows alone */
 	uint32_t lobe_rays;   /* rays spent on the G rows of a patch-side and lobe */
+	enum ff_paper paper;  /* one hemicube at each centre, lobes by its pixels */
 	int centroid;         /* links as in the paper: a direction for each source */
 	uint32_t lobe_depth;  /* lobes in succession that light of a lobe is followed through */
 	uint32_t depth;       /* longest chain of events followed */

@@ -22,7 +22,8 @@ from oracle2gltf import scene_of
 from oracles import chain_field
 
 SCHEMES = {
-    "paper": ["-m", "hemicube", "--links", "centroid"],
+    "paper": ["--paper"],
+    "hemicube": ["-m", "hemicube", "--links", "centroid"],
     "centroid": ["--links", "centroid"],
     "one lobe": ["--lobe-depth", "0"],
     "default": [],

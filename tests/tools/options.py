@@ -11,7 +11,7 @@ TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 sys.path.insert(0, os.path.join(TESTS, "independent"))
 from chain import BUILD, TOP, Tap
 
-OPTION = re.compile(r" +(?:(-[A-Za-z]), )?--([a-z][a-z-]*)(?: (\S+))?(?:  +(\S.*))?$")
+OPTION = re.compile(r" +(?:(-[A-Za-z]), )?--([a-z][a-z-]*)(?: |(?=\[))?(\S+)?(?:  +(\S.*))?$")
 
 
 def output(*command):

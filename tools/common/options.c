@@ -76,8 +76,8 @@ static int label(const struct option_spec *o, char *text, size_t size)
 
 	if (o->letter)
 		snprintf(letter, sizeof letter, "-%c, ", o->letter);
-	return snprintf(text, size, "  %s--%s%s%s", letter, o->name, o->argument ? " " : "",
-	                o->argument ? o->argument : "");
+	return snprintf(text, size, "  %s--%s%s%s", letter, o->name,
+	                o->argument && *o->argument != '[' ? " " : "", o->argument ? o->argument : "");
 }
 
 static long integer_in(const struct option_spec *o, const void *field)
@@ -269,7 +269,7 @@ static int find_word(const struct option_spec *o, const char *text, size_t n)
 static void take_word(const struct cli *c, const struct option_spec *o, const char *text,
                       void *field)
 {
-	int i = find_word(o, text, strlen(text));
+	int i = text ? find_word(o, text, strlen(text)) : 1;
 
 	if (i < 0)
 		no_such_word(c, o, text);
@@ -429,7 +429,8 @@ static void getopt_tables(const struct options *all, struct getopt_tables *t)
 		const struct option_spec *o = all->spec[i];
 		t->longs[i] = (struct option){
 			.name = o->name, .val = LONG + i,
-			.has_arg = o->argument ? required_argument : no_argument };
+			.has_arg = !o->argument ? no_argument
+			         : *o->argument == '[' ? optional_argument : required_argument };
 		if (!o->letter)
 			continue;
 		*s++ = (char)o->letter;

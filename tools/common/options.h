@@ -38,7 +38,8 @@ enum option_role {
 struct option_spec {
 	int letter;              /* or 0 */
 	const char *name;        /* long name; NULL ends a table */
-	const char *argument;    /* its name in --help, or NULL */
+	const char *argument;    /* its name in --help, or NULL; in brackets, [=NAME], where it
+	                            may be left out, which stands for the second word */
 	const char *help;        /* one line; %s in it is what the request holds before */
 	enum option_type type;
 	size_t at, size;         /* of the value in the request */
