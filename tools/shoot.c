@@ -54,6 +54,7 @@ struct job {
 	struct transport t;
 	struct solution s;
 	struct radiosity_report report;
+	int cubes;                  /* any form factors by hemicubes */
 	FILE *log;
 	struct progress progress;   /* by the logarithm of what is unshot */
 	double begun;
@@ -93,13 +94,16 @@ static void sort_shards(struct job *j)
 		j->ff[i] = &j->file[i].f;
 }
 
-/* The paper's form factors have no chains: ideal surfaces are lobes in them. */
-static int check_paper(const struct job *j, const struct ff_file *f, const char *name,
+/* How form factors were made: the paper's have no chains, as ideal surfaces are lobes in them;
+ * errors of hemicubes are smooth. */
+static int check_method(struct job *j, const struct ff_file *f, const char *name,
                        struct err *e)
 {
 	json_t *made_by = json_loads(f->info.options ? f->info.options : "{}", 0, NULL);
 	int is_paper = json_object_get(made_by, "paper") != NULL;
+	const char *method = json_string_value(json_object_get(made_by, "method"));
 
+	j->cubes |= method && strcmp(method, "hemicube") == 0;
 	json_decref(made_by);
 	if (is_paper && !j->r->paper)
 		return err_set(e, "%s: made by ffcalc --paper; give --paper here, too", name);
@@ -119,7 +123,7 @@ static int open_inputs(struct job *j, struct err *e)
 		return -1;
 	for (size_t i = 0; i < r->shards; i++) {
 		if (file_ff_open(r->ff[i], &j->m, &j->mesh, &j->file[i], e) ||
-		    check_paper(j, &j->file[i], r->ff[i], e))
+		    check_method(j, &j->file[i], r->ff[i], e))
 			return -1;
 		j->name[i] = r->ff[i];
 	}
@@ -285,7 +289,7 @@ static int solve(struct job *j, struct err *e)
 		return -1;
 	t2 = cli_seconds();
 	t3 = cli_seconds();
-	if (interp_discretisation(&j->m, &j->s, j->cli->threads, e))
+	if (interp_discretisation(&j->m, &j->s, !j->cubes, j->cli->threads, e))
 		return -1;
 	j->prepare_seconds = t1 - t0;
 	j->solve_seconds = t2 - t1;

@@ -28,7 +28,7 @@ static int solve(const struct twopass_scene *s, const struct twopass_solve_optio
 	          radiosity_transport_init(&t, &s->m, &ff, &name, 1, o.threads, e) ||
 	          radiosity_begin(out, &s->m, &t, 0, e) ||
 	          radiosity_solve(out, &t, &o, &hooks, &report, e) ||
-	          interp_discretisation(&s->m, out, o.threads, e);
+	          interp_discretisation(&s->m, out, 1, o.threads, e);
 	radiosity_transport_free(&t);
 	return bad ? -1 : 0;
 }

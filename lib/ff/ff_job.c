@@ -3,6 +3,7 @@
 
 #include <stdlib.h>
 
+#include "lib/ff/hemicube_pilot.h"
 #include "lib/ff/landings.h"
 #include "lib/ff/row_reciprocal.h"
 #include "lib/ff_rays/chain_limit.h"
@@ -150,13 +151,17 @@ int ff_thread_init(struct ff_thread *t, const struct ff_job *j, struct err *e)
 	                  "hemicube items", e);
 	t->view = mem_new(2 * (size_t)j->o.points, sizeof *t->view, "hemicube views", e);
 	t->weight = mem_new(j->grid.pixels, sizeof *t->weight, "hemicube lobes", e);
-	return t->item && t->view && t->weight ? ff_hemicube_init(&t->cube, &j->grid, e) : -1;
+	if (!t->item || !t->view || !t->weight || ff_hemicube_init(&t->cube, &j->grid, e))
+		return -1;
+	return j->o.points == 1 ? ff_hemicube_pilot_init(t, e) : 0;
 }
 
 void ff_thread_free(struct ff_thread *t)
 {
 	ff_tally_free(&t->tally);
 	ff_hemicube_free(&t->cube);
+	free(t->pilot_sum);
+	free(t->pilot_item);
 	if (t->formula)
 		occ_exchanger_free(t->formula);
 	free(t->formula);

@@ -11,6 +11,7 @@
 #include "lib/base/constants.h"
 #include "lib/base/vec.h"
 #include "lib/ff/directional.h"
+#include "lib/ff/hemicube_pilot.h"
 #include "lib/ff/hemicube_subpixel.h"
 #include "lib/ff_rays/ray_follow.h"
 #include "lib/ff_rays/ray_samples.h"
@@ -246,6 +247,8 @@ static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struc
 		gather(t, ps);
 		if (j->emits[ps])
 			ff_hemicube_subpixel(t, ps);
+		if (j->o.points == 1)
+			ff_hemicube_pilot(t, ps);
 		if (ff_tally_finish(&t->tally, j->shoots_diffuse[ps] ? b : &unused, ps, FF_DIFFUSE,
 		                    samples, 1, e))
 			return -1;

@@ -11,6 +11,7 @@
 
 #include "lib/base/vec.h"
 #include "lib/data/punctual.h"
+#include "lib/ff/hemicube_pilot.h"
 #include "lib/ff_rays/ray_samples.h"
 #include "lib/hemicube/hemicube_lobe.h"
 #include "lib/scatter/bsdf.h"
@@ -276,6 +277,7 @@ static int side_rows(struct ff_thread *t, uint32_t ps, struct ff_batch *b, struc
 
 	if (j->shoots_diffuse[ps]) {
 		land(t, side, j->grid.delta);
+		ff_hemicube_pilot(t, ps);
 		if (finish(t, ps, FF_DIFFUSE, b, e))
 			return -1;
 	}

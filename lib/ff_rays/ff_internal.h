@@ -16,7 +16,7 @@
  * FF_HALVINGS: the most of a row's rays, down to an eighth. Both are guesses; the errors stated
  * with them are measured by tests/tools/stated_errors.t. */
 enum { FF_REPLICATES = 4, FF_DIMS = 4, FF_CLOSE_RAYS = 2048,
-       FF_HALVINGS = 3 };
+       FF_HALVINGS = 3, FF_PILOTS = 4 };
 
 /* An element as a place to send rays from. Points are corner + w1 edge[0] + w2 edge[1],
  * with weights that keep a little clear of the edges. Threes are padded to four. */
@@ -144,6 +144,8 @@ struct ff_thread {
 	struct hemicube cube;
 	uint32_t *item;           /* hemicube: [points][2 sides][pixels] of the patch */
 	struct view *view;        /* hemicube: [points][2 sides] */
+	double (*pilot_sum)[FF_PILOTS]; /* one hemicube a side: [2E] what tells its error */
+	uint32_t *pilot_item;     /* [FF_PILOTS][pixels] */
 	double *weight;           /* the paper's: [pixels] */
 	double rays;
 	struct array shares;      /* struct ff_share */

@@ -428,8 +428,11 @@ int ff_tally_finish(struct tally *t, struct ff_batch *b, uint32_t row_side,
 		return -1;
 	/* All samples in one place tell no more than a sample's weight. */
 	double error = samples ? fmax(sqrt(f.variance), 1. / samples) : 0;
-	if (t->dependent && t->replicates >= 2 && f.variance > 0)
-		samples = (uint32_t)fmax(1, fmin(samples, f.even / f.variance));
+	if (t->dependent && f.variance > 0 && !(t->worth > 0))
+		t->worth = f.even / f.variance;
+	if (t->worth > 0)
+		samples = (uint32_t)fmax(1, fmin(samples, t->worth));
+	t->worth = 0;
 	clear(t);
 	struct ff_batch_row row = { row_side, kind, samples, f.sum > 0 ? 1 / f.sum : 0,
 	                         1 - f.sum / total, error };

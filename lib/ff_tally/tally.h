@@ -40,6 +40,7 @@ struct tally {
 	double (*toward)[3];       /* [2P] summed directions to where light comes from */
 	double escape_before, escape_square;
 	int replicates;
+	double worth;              /* the row is worth so many samples; 0: not known yet */
 	int dependent;             /* samples of a replicate are no independent ones */
 
 	struct tally_chains far;      /* longer chains */

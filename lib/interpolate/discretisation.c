@@ -400,7 +400,7 @@ static void take_parts(const struct job *j)
 	}
 }
 
-int interp_discretisation(const struct model *m, struct solution *s, int threads,
+int interp_discretisation(const struct model *m, struct solution *s, int independent, int threads,
                           struct err *e)
 {
 	size_t n = s->element_sides * PARTS * (size_t)s->bands;
@@ -415,7 +415,7 @@ int interp_discretisation(const struct model *m, struct solution *s, int threads
 	    !interp_smooth_groups_new(m, COS_CREASE, &j.g, e)) {
 		take_parts(&j);
 		par_for(m->element.n, CHUNK, threads, differences, &j, NULL);
-		bad = !by_patches(&j) && correct_noise(&j, e);
+		bad = independent && !by_patches(&j) && correct_noise(&j, e);
 		if (!bad)
 			par_for(m->element.n, CHUNK, threads, errors, &j, NULL);
 	}

@@ -18,14 +18,15 @@
 
 struct solution;
 
-/* Scales standard errors, of each part all alike, down to what most elements differ by from
+/* Scales standard errors, where they are `independent` of element, of each part all alike, down to what most elements differ by from
  * their neighbours, if that is less (not where the elements of each patch share a value,
- * which then says nothing). Fills s->error.discretisation and its part
+ * which then says nothing). What one hemicube for a whole patch is off by is smooth over its
+ * neighbours, who do not show it: it is not independent. Fills s->error.discretisation and its part
  * s->error.discretisation_direct [2E][bands], in units of irradiance: root mean square over the
  * element-side. 0 where too few others of the same smooth surface touch it and its
  * neighbours, since nothing is known there. Light groups are summed. O(elements), the same
  * for any number of threads. 0, or -1 and e. */
-int interp_discretisation(const struct model *m, struct solution *s, int threads,
+int interp_discretisation(const struct model *m, struct solution *s, int independent, int threads,
                           struct err *e);
 
 #endif

@@ -182,7 +182,7 @@ static int part_errors(const struct view_scene *v, const struct solution *s, int
 		if (s->error.sampling_direct && parts & PART_DIRECT)
 			some->error.sampling_direct[i] = s->error.sampling_direct[i];
 	}
-	return interp_discretisation(v->m, some, threads, e);
+	return interp_discretisation(v->m, some, 1, threads, e);
 }
 
 /* The standard error of what is interpolated. */

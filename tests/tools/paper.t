@@ -8,6 +8,7 @@ prepare ffcalc -n 16 -m hemicube -p 1 "$T/a.mesh" -o "$T/b.ff"
 prepare shoot --paper "$T/a.mesh" "$T/a.ff" -o "$T/a.rad"
 
 check "rows are those of eq. (3) by brute force" $PYTHON "$top/tests/independent/paper.py"
+check "errors of one hemicube a side are stated" $PYTHON "$top/tests/independent/hemicube_errors.py"
 check "the ledger closes" inspect --verify "$T/a.rad"
 check "threads change nothing" sh -c "ffcalc -j 2 -n 16 --paper '$T/a.mesh' -o '$T/c.ff' && cmp '$T/a.ff' '$T/c.ff'"
 check "a picture" trace --paper -c overview -s 16x12 "$T/a.rad" -o "$T/a.exr"

@@ -121,7 +121,7 @@ static struct outcome run_noisy(field *f, double noise, double said)
 		s.irradiance.indirect[2 * i] = mean(&m, i, f) + noise * sqrt(12) * (rng_uniform(&g) - .5);
 		s.error.sampling[2 * i] = said;
 	}
-	assert_int_equal(interp_discretisation(&m, &s, 2, &e), 0);
+	assert_int_equal(interp_discretisation(&m, &s, 1, 2, &e), 0);
 	assert_int_equal(interp_reconstruct(&m, &s, PART_ALL, 1, &r, &e), 0);
 	for (size_t i = 0; i < m.element.n; i++) {
 		o.exact += m.element.area[i] * square(&m, &r, i, f);
