@@ -76,4 +76,14 @@ static inline double rng_scramble(uint32_t bits, uint32_t seed)
 	return (double)rng_scramble_bits(bits, seed) * 0x1p-32;
 }
 
+/* The place of a point in an order of the sequence of its own, chosen by `seed`: blocks of 2^k
+ * points stay blocks. What one path takes for one event after another is independent if each
+ * event has an order, and a scramble, of its own, and evenly spread among paths all the same
+ * (Burley, JCGT 9(4), 2020). A new scramble alone would keep points of one event next to one
+ * another in the next. */
+static inline uint32_t rng_shuffle(uint32_t index, uint64_t seed)
+{
+	return rng_scramble_bits(rng_reverse_bits(index), (uint32_t)rng_mix(~seed));
+}
+
 #endif

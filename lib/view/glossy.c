@@ -8,11 +8,13 @@
 #include "lib/base/vec.h"
 #include "lib/scatter/lobe.h"
 #include "lib/view/shade_tile.h"
+#include "lib/view/specular_path.h"
 
 /* Counts of samples, powers of two, which Sobol points fill evenly. Guesses; README.md has what
  * lobes cost in pictures (tests/bench/report). */
 enum {
-	FIRST = 4, MOST = 64,  /* of a part where an error is aimed at */
+	PILOT = 16,            /* that tell how many the first lobe of its kind in a tile takes */
+	FEWEST = 1, MOST = 64, /* of a part where an error is aimed at */
 	PROBES = 8             /* of each of two parts that tell how far one ray is off */
 };
 
@@ -25,6 +27,14 @@ static const double together = .8;
  * less than the noise of samples that stop at an error of 5 %. */
 static const double worth_aiming = .01;
 
+/* What a lobe behind one that is sampled carries less than, relative to that one, goes on by as much
+ * less chance. A guess. */
+static const double worth_following = .25;
+
+/* How far what tells of later lobes of a kind moves towards what the last one told: the mean of about
+ * the last four, those of the pixel. A guess. */
+static const double forgets = .25;
+
 /* Sums over the samples of a part. */
 struct part {
 	double rest[BANDS_MAX], lit[BANDS_MAX];
@@ -34,60 +44,57 @@ struct part {
 struct run {
 	struct view_walker *w;
 	const struct view_branch *b;
-	const struct view_lobe_seen *l;
+	const struct aim_lobe *l;
 	const double *coefficient;
 	struct view_branch *next;
+	int sampled;             /* what emitters send straight to it is */
 	uint32_t first;          /* index of the first sample */
 	struct part part[REPLICATES];
 };
 
-/* Follows the next branch to its end. */
-static void follow(struct run *r, double scale, struct part *to)
-{
-	struct view_walker *w = r->w;
-	size_t below = w->waiting;
+/* ---- one sample ---- */
 
-	memset(w->directional, 0, sizeof w->directional);
-	memset(w->lit, 0, sizeof w->lit);
-	view_push(w, r->b, r->next, r->coefficient, scale);
-	view_run(w, below);
-	for (int b = 0; b < w->v->m->bands; b++) {
-		to->rest[b] += w->directional[b];
-		to->lit[b] += w->lit[b];
-	}
+/* Numbers of sample `next->index` of a lobe: a direction of it, and what is aimed at. */
+static double number(const struct view_branch *next, int dim)
+{
+	return rng_sobol(rng_shuffle(next->index, next->seed), dim, next->seed);
 }
 
-/* Aims at an image of an emitter, for sample i, and follows that. */
-static void follow_aimed(struct run *r, uint32_t i, struct part *to)
+/* Aims `next`, which is about to leave a lobe, at an image of an emitter. What comes straight to
+ * the first lobe is kept apart. */
+static void add_aimed(struct view_walker *w, const struct view_branch *b, const struct aim_lobe *l,
+                      const double *coefficient, const struct view_branch *next)
 {
-	const struct emitter_images *images = &r->w->v->images;
-	const struct view_lobe_weight weight = { r->l, r->w->v->m->lobe };
-	struct view_branch *next = r->next;
+	const struct aim_lobe_weight weight = { l, w->v->m->lobe };
+	double u[3], dir[3], value[BANDS_MAX];
 	uint32_t image;
-	double u[3];
 
 	for (int k = 0; k < 3; k++)
-		u[k] = rng_sobol(r->first + i, 2 + k, next->seed);
-	double chance = view_emitter_images_aim(images, &r->w->aim, u, next->dir, &image);
-	if (!(chance > 0))
+		u[k] = number(next, 2 + k);
+	double chance = aim_images_aim(&w->v->images, &next->aim, u, dir, &image);
+	double f = chance > 0 ? aim_lobe_weight_at(dir, &weight) : 0;
+	if (!(f > 0))
 		return;
-	next->aimed = 1 + image;
-	chance += view_lobe_density(r->l, weight.kind, next->dir);
-	follow(r, view_lobe_weight_at(next->dir, &weight) / chance, to);
-	next->aimed = 0;
+	f /= chance + aim_lobe_density(l, weight.kind, dir);
+	for (int i = 0; i < w->v->m->bands; i++)
+		value[i] = b->weight[i] * coefficient[i] * f;
+	int came = view_aimed(w, next, dir, image, value);
+	double *to = came == VIEW_AIMED_STRAIGHT && next->straight ? w->lit : w->directional;
+	for (int i = 0; i < w->v->m->bands && came; i++)
+		to[i] += value[i];
 }
 
-/* Follows sample i to its end and adds it to a part; without one, has it wait. */
-static void follow_sample(struct run *r, uint32_t i, struct part *to)
+/* Sends `next` along a direction of the lobe, and where there is something to aim at there, too. */
+static void push_sample(struct view_walker *w, const struct view_branch *b,
+                        const struct aim_lobe *l, const double *coefficient,
+                        struct view_branch *next)
 {
-	const struct view_lobe_seen *l = r->l;
-	enum lobe_kind kind = r->w->v->m->lobe;
-	struct view_walker *w = r->w;
-	struct view_branch *next = r->next;
+	enum lobe_kind kind = w->v->m->lobe;
+	double u[2] = { number(next, 0), number(next, 1) };
 
-	next->index = r->first + i;
-	double u[2] = { rng_sobol(next->index, 0, next->seed),
-		        rng_sobol(next->index, 1, next->seed) };
+	next->depth = b->depth + 1;
+	if (next->aim.tree)
+		add_aimed(w, b, l, coefficient, next);
 	if (kind == LOBE_RECIPROCAL)
 		bsdf_lobe_sample_whole(l->k, l->axis, u, next->dir);
 	else
@@ -95,32 +102,49 @@ static void follow_sample(struct run *r, uint32_t i, struct part *to)
 	double cos_i = v3_dot(l->normal, next->dir);
 	if (!(cos_i > 0))
 		return;
-	if (!to) {
-		view_push(w, r->b, next, r->coefficient, view_lobe_per_density(l, kind, cos_i));
-		return;
-	}
-	next->density = view_lobe_density(l, kind, next->dir);
-	follow(r, view_lobe_per_density(l, kind, cos_i), to);
+	next->chance = aim_lobe_density(l, kind, next->dir);
+	next->way = 0;
+	next->chain = 0;
+	if (next->straight)
+		next->density = next->chance;
+	view_push(w, b, next, coefficient, aim_lobe_per_density(l, kind, cos_i));
 }
 
-static void follow_both(struct run *r, uint32_t i, struct part *to)
+void view_lobe_go_on(struct view_walker *w, const struct view_branch *b, const struct aim_lobe *l,
+                     const double *coefficient, struct view_branch *next)
 {
-	follow_sample(r, i, to);
-	if (r->w->aim.sum > 0)
-		follow_aimed(r, i, to);
+	aim_images_choose(&w->v->images, l, 1, 0, &next->aim);
+	push_sample(w, b, l, coefficient, next);
 }
 
-/* What is aimed at has to bring a part of the light of a pixel. */
-static void aim(struct view_walker *w, const struct view_branch *b, const struct view_lobe_seen *l,
-                const double *coefficient)
+/* Follows sample i to its end and adds it to a part. */
+static void follow_sample(struct run *r, uint32_t i, struct part *to)
 {
-	double other = 0, most = 0;
+	struct view_walker *w = r->w;
+	size_t below = w->waiting;
 
-	for (int i = 0; i < w->v->m->bands; i++) {
-		other += l->other[i] / w->v->m->bands;
-		most = fmax(most, b->weight[i] * coefficient[i]);
+	memset(w->directional, 0, sizeof w->directional);
+	memset(w->lit, 0, sizeof w->lit);
+	r->next->index = r->first + i;
+	push_sample(w, r->b, r->l, r->coefficient, r->next);
+	view_run(w, below);
+	for (int b = 0; b < w->v->m->bands; b++) {
+		to->rest[b] += w->directional[b];
+		to->lit[b] += w->lit[b];
 	}
-	view_emitter_images_choose(&w->v->images, l, worth_aiming * other / most, &w->aim);
+}
+
+/* ---- how many ---- */
+
+/* Follows n samples, in four parts if they are as many; returns the number of parts. */
+static int follow_samples(struct run *r, uint32_t n)
+{
+	uint32_t parts = n < REPLICATES ? n : REPLICATES;
+
+	memset(r->part, 0, sizeof r->part);
+	for (uint32_t i = 0; i < n; i++)
+		follow_sample(r, i, &r->part[(uint64_t)i * parts / n]);
+	return (int)parts;
 }
 
 /* Mean and variance of n samples in `parts` parts, with emitters or without. */
@@ -138,50 +162,70 @@ static void measure(const struct run *r, int parts, double n, int lit, double *m
 	}
 }
 
-static int settled(const struct run *r, double n)
+/* Samples that it would take for the error aimed at, by what n samples in four parts have found. */
+static double wanted(const struct run *r, double n)
 {
-	double mean[BANDS_MAX], variance[BANDS_MAX], aim = r->w->shader->lobe_relative;
+	double mean[BANDS_MAX], variance[BANDS_MAX], aim = r->w->shader->lobe_relative, most = 0;
 
-	measure(r, REPLICATES, n, !occ_direct_exact(r->w->v->direct), mean, variance);
+	measure(r, REPLICATES, n, r->sampled, mean, variance);
 	for (int b = 0; b < r->w->v->m->bands; b++) {
 		double all = aim * (mean[b] + r->l->other[b]);
-		if (variance[b] > all * all)
-			return 0;
+		if (variance[b] > 0)
+			most = fmax(most, n * variance[b] / (all * all));
 	}
-	return 1;
+	return most;
 }
 
-/* As many samples as it takes: returns their number. */
-static uint32_t follow_until(struct run *r)
+/* As many samples as it takes, which lobes of the kind before in the tile have told, or a pilot of
+ * this one: never those that are kept, which would leave out what is seldom met. Returns their
+ * number. */
+static uint32_t follow_enough(struct run *r)
 {
-	uint32_t each = FIRST;
+	double *unrest = &r->w->unrest[r->l->id];
+	uint32_t each = FEWEST;
 
-	size_t stride = sizeof *r->part / sizeof(double);
-
-	for (uint32_t i = 0; i < REPLICATES * each; i++)
-		follow_both(r, i, &r->part[i / each]);
-	while (!settled(r, REPLICATES * each) && each < MOST) {
-		/* As many again: the parts so far are half as many, twice as long. */
-		each *= 2;
-		for (int b = 0; b < r->w->v->m->bands; b++) {
-			replicates_halve(&r->part[0].rest[b], stride);
-			replicates_halve(&r->part[0].lit[b], stride);
-		}
-		for (uint32_t i = REPLICATES / 2 * each; i < REPLICATES * each; i++)
-			follow_both(r, i, &r->part[i / each]);
+	if (!(*unrest > 0)) {
+		uint64_t seed = r->next->seed;
+		r->next->seed = rng_mix(~seed);
+		r->first = r->b->index * PILOT;
+		follow_samples(r, PILOT);
+		*unrest = fmax(1, wanted(r, PILOT));
+		r->next->seed = seed;
 	}
+	while (each < MOST && REPLICATES * each < *unrest)
+		each *= 2;
+	r->first = r->b->index * REPLICATES * MOST;
+	follow_samples(r, REPLICATES * each);
+	*unrest += forgets * (fmax(1, wanted(r, REPLICATES * each)) - *unrest);
 	return REPLICATES * each;
 }
 
-/* How many, fewer where what is before the lobe has dimmed it. */
-static uint32_t fixed_number(const struct run *r)
+static double carried(const struct run *r)
 {
 	double most = 0;
 
 	for (int b = 0; b < r->w->v->m->bands; b++)
 		most = fmax(most, r->b->weight[b] * r->coefficient[b]);
-	return (uint32_t)fmax(1, fmin(1, most) * r->w->o->lobe_samples + .5);
+	return most;
 }
+
+/* Follows as many samples as are asked for, fewer where what is before the lobe has dimmed it;
+ * returns their number and in how many parts. */
+static uint32_t follow_all(struct run *r, int *parts)
+{
+	int asked = r->w->o->lobe_samples;
+
+	if (asked == VIEW_LOBE_ENOUGH) {
+		*parts = REPLICATES;
+		return follow_enough(r);
+	}
+	uint32_t n = (uint32_t)fmax(1, fmin(1, carried(r)) * asked + .5);
+	r->first = r->b->index * (uint32_t)asked;
+	*parts = follow_samples(r, n);
+	return n;
+}
+
+/* ---- lobes ---- */
 
 /* The emitters' part waits: by formula it may be better than what samples found of it. */
 static void put_light(struct run *r, int parts, double n, const double *lit)
@@ -198,47 +242,32 @@ static void put_light(struct run *r, int parts, double n, const double *lit)
 	view_shade_tile_put_lobe(r->w->shader, &q);
 }
 
-/* Follows as many samples as are asked for; returns their number and in how many parts. */
-static uint32_t follow_all(struct run *r, int *parts)
+/* What is aimed at has to bring a part of the light of a pixel. */
+static void aim(struct run *r)
 {
-	const struct view_branch *b = r->b;
-	uint32_t n =
-	    r->w->o->lobe_samples == VIEW_LOBE_ENOUGH ? REPLICATES * MOST : fixed_number(r);
+	double other = 0;
 
-	r->next->share = b->share / n;
-	*parts = REPLICATES;
-	if (r->w->o->lobe_samples == VIEW_LOBE_ENOUGH) {
-		r->first = b->index * n;
-		return follow_until(r);
-	}
-	*parts = n < REPLICATES ? (int)n : REPLICATES;
-	r->first = b->index * (uint32_t)r->w->o->lobe_samples;
-	for (uint32_t i = 0; i < n; i++)
-		follow_both(r, i, &r->part[i * (uint32_t)*parts / n]);
-	return n;
+	for (int i = 0; i < r->w->v->m->bands; i++)
+		other += r->l->other[i] / r->w->v->m->bands;
+	r->sampled = view_shade_tile_sampled(r->w->shader, 2 * r->l->element + (uint32_t)r->l->side);
+	aim_images_choose(&r->w->v->images, r->l, r->sampled, worth_aiming * other / carried(r),
+	                  &r->next->aim);
 }
 
-void view_lobe_follow(struct view_walker *w, const struct view_branch *b,
-                      const struct view_lobe_seen *l, const double *coefficient,
-                      struct view_branch *next)
+void view_lobe_follow(struct view_walker *w, const struct view_branch *b, const struct aim_lobe *l,
+                      const double *coefficient, struct view_branch *next)
 {
 	struct run r = { .w = w, .b = b, .l = l, .coefficient = coefficient, .next = next };
 	double directional[BANDS_MAX], cut[BANDS_MAX], lit[BANDS_MAX] = { 0 };
 	int parts;
 
-	next->lobes = 1;
-	if (b->lobes) {
-		r.first = b->index;
-		follow_sample(&r, 0, NULL);
-		return;
-	}
 	memcpy(directional, w->directional, sizeof directional);
 	memcpy(cut, w->cut, sizeof cut);
 	memset(w->cut, 0, sizeof w->cut);
 	memset(w->blurred, 0, sizeof w->blurred);
-	next->straight = 1;
-	next->turns = 0;
-	aim(w, b, l, coefficient);
+	next->lobes = next->straight = 1;
+	next->worth = worth_following * carried(&r);
+	aim(&r);
 	uint32_t n = follow_all(&r, &parts);
 	for (int k = 0; k < w->v->m->bands; k++) {
 		w->directional[k] = directional[k];
@@ -249,32 +278,35 @@ void view_lobe_follow(struct view_walker *w, const struct view_branch *b,
 		w->cut[k] = cut[k] + w->cut[k] / n;
 		w->error[k] += sqrt(w->blurred[k] / n);
 	}
-	w->aim.sum = 0;
 	put_light(&r, parts, n, lit);
 }
 
-void view_lobe_probe(struct view_walker *w, const struct view_branch *b,
-                     const struct view_lobe_seen *l, const double *coefficient, double scale,
-                     const struct view_branch *axial)
+void view_lobe_probe(struct view_walker *w, const struct view_branch *b, const struct aim_lobe *l,
+                     const double *coefficient, double scale, const struct view_branch *axial)
 {
 	struct view_branch next = *axial;
 	struct run r = { .w = w, .b = b, .l = l, .coefficient = coefficient, .next = &next,
 	                 .first = 2 * PROBES * b->index };
-	struct part one = { { 0 }, { 0 } };
-	double directional[BANDS_MAX], cut[BANDS_MAX];
+	double one[BANDS_MAX], directional[BANDS_MAX], cut[BANDS_MAX];
+	size_t below = w->waiting;
 
 	memcpy(directional, w->directional, sizeof directional);
 	memcpy(cut, w->cut, sizeof cut);
+	memset(w->directional, 0, sizeof w->directional);
+	memset(w->lit, 0, sizeof w->lit);
 	next.lobes = next.straight = 1;
-	next.density = view_lobe_density(l, w->v->m->lobe, l->axis);
-	follow(&r, scale, &one);
+	next.density = aim_lobe_density(l, w->v->m->lobe, l->axis);
+	next.worth = worth_following * carried(&r);
+	view_push(w, b, &next, coefficient, scale);
+	view_run(w, below);
+	for (int k = 0; k < w->v->m->bands; k++)
+		one[k] = w->directional[k] + w->lit[k];
 	for (uint32_t i = 0; i < 2 * PROBES; i++)
 		follow_sample(&r, i, &r.part[i / PROBES]);
 	for (int k = 0; k < w->v->m->bands; k++) {
 		double off[2], weight = b->weight[k] * coefficient[k];
 		for (int p = 0; p < 2; p++)
-			off[p] = one.rest[k] + one.lit[k] -
-			         (r.part[p].rest[k] + r.part[p].lit[k]) / PROBES;
+			off[p] = one[k] - (r.part[p].rest[k] + r.part[p].lit[k]) / PROBES;
 		w->probed[k] += weight * weight;
 		w->off[k] += off[0] * off[1];
 	}

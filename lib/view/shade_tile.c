@@ -10,17 +10,30 @@ int view_shade_tile_init(struct view_shade_tile *s, const struct view_scene *v,
 	*s = (struct view_shade_tile){ .v = v, .relative = relative, .lobe_relative = lobe_relative,
 	                           .gather = gather, .thread = thread };
 	s->direct = occ_direct_worker_new(v->direct, e);
-	return s->direct ? 0 : -1;
+	s->sampled = mem_new(v->lobes ? v->m->element.n : 0, 2, "lobes", e);
+	return s->direct && s->sampled ? 0 : -1;
 }
 
 void view_shade_tile_free(struct view_shade_tile *s)
 {
 	occ_direct_worker_free(s->direct);
+	free(s->sampled);
 	free(s->request.data);
 	free(s->weight.data);
 	free(s->order.data);
 	free(s->lobe.data);
 	free(s->lobe_order.data);
+}
+
+int view_shade_tile_sampled(struct view_shade_tile *s, uint32_t element_side)
+{
+	enum { SAMPLED = 1, BY_FORMULA };
+
+	if (!s->sampled[element_side]) {
+		occ_direct_begin(s->direct, element_side);
+		s->sampled[element_side] = occ_direct_sampled(s->direct) ? SAMPLED : BY_FORMULA;
+	}
+	return s->sampled[element_side] == SAMPLED;
 }
 
 /* Puts the last request of `of` in the order of element-sides. */
@@ -104,13 +117,13 @@ static void shade_lobe(struct view_shade_tile *s, size_t request, const struct v
 {
 	const struct view_lobe_request *q =
 	    (const struct view_lobe_request *)s->lobe.data + request;
-	struct view_lobe_weight lobe = { &q->l, s->v->m->lobe };
-	struct direct_weight weight = view_lobe_weight(&lobe);
+	struct aim_lobe_weight lobe = { &q->l, s->v->m->lobe };
+	struct direct_weight weight = aim_lobe_weight(&lobe);
 	size_t at = q->slot * (size_t)s->v->m->bands;
 	double h[BANDS_MAX];
 
 	occ_direct_begin(s->direct, 2 * q->l.element + (uint32_t)q->l.side);
-	int sampled = occ_direct_sampled(s->direct);
+	int sampled = view_shade_tile_sampled(s, 2 * q->l.element + (uint32_t)q->l.side);
 	if (!sampled && occ_direct_weighted(s->direct, q->l.x, &weight, h, &s->e))
 		return;
 	for (int b = 0; b < s->v->m->bands; b++, at++) {

@@ -6,7 +6,7 @@
 
 #include "lib/base/mem.h"
 #include "lib/view/final_gather.h"
-#include "lib/view/lobe_weight.h"
+#include "lib/aim/lobe_weight.h"
 #include "lib/view/view_scene.h"
 
 /* A point whose diffuse light goes, by `weight`, into a sample's diffuse or directional
@@ -21,7 +21,7 @@ struct view_request {
 /* A lobe that was sampled: what its samples found of emitters is to be added, or better what
  * these send by formula. */
 struct view_lobe_request {
-	struct view_lobe_seen l;
+	struct aim_lobe l;
 	uint32_t slot;
 	double weight[BANDS_MAX];   /* that its light goes into the directional part by */
 	double found[BANDS_MAX];
@@ -35,6 +35,7 @@ struct view_shade_tile {
 	double relative;            /* error of sampled light to aim at, and of */
 	double lobe_relative;       /* samples of lobes */
 	struct direct_worker *direct;
+	unsigned char *sampled;     /* [2 elements] emitters are, 1, sampled, 2 by formula */
 	struct gather *gather;      /* NULL: indirect light is interpolated */
 	int thread, asking;         /* asking: points are told to gather, not shaded */
 	struct array request;       /* struct view_request */
@@ -50,6 +51,9 @@ int view_shade_tile_init(struct view_shade_tile *s, const struct view_scene *v,
                          struct gather *gather, double relative, double lobe_relative, int thread,
                          struct err *e);
 void view_shade_tile_free(struct view_shade_tile *s);
+
+/* 1 if what emitters send straight to points of a side is sampled, not by formula. Found once. */
+int view_shade_tile_sampled(struct view_shade_tile *s, uint32_t element_side);
 
 void view_shade_tile_put(struct view_shade_tile *s, const struct view_request *q,
                          const double *weight);

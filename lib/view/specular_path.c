@@ -10,110 +10,33 @@
 #include "lib/view/glossy.h"
 #include "lib/view/highlights.h"
 #include "lib/view/shade_tile.h"
+#include "lib/view/surface_point.h"
 
 /* Up to how many directional events from the eye light is computed rather than interpolated, a
  * count: beyond, little of it reaches the pixel; a guess that trace(1) names. Behind a lobe
  * that is sampled it is always interpolated. */
 enum { COMPUTED_DEPTH = 4 };
 
-/* Backs of one-sided materials in a row that a ray may pass, a count: more than any scene has, so
- * that rounding between coincident faces cannot hold a ray for ever. */
-enum { PASSES_MAX = 4096 };
-
 /* Cosines are no less: at grazing angles the weight of a lobe is large but finite. */
 static const double cosine_least = 1e-14;
 
-/* A surface point as a ray meets it. */
-struct point {
-	uint32_t element, material;
-	int side;
-	double x[3], n[3];  /* n: front normal */
-	double w[3];        /* weights of the element's corners */
-	double cosine;      /* |n.dir| */
-	double way;         /* to it */
-};
-
-/* 1 if the ray meets a surface. */
-static int meet(const struct view_scene *v, const double org[3], const double dir[3],
-                struct point *p)
-{
-	const struct model *m = v->m;
-	struct ray_hit hit;
-
-	ray_nearest(v->rays, org, dir, &hit);
-	if (hit.triangle == RAY_MISS)
-		return 0;
-	p->element = model_locate(m, hit.triangle, hit.w);
-	p->material = m->surface.material[m->triangle.surface[hit.triangle]];
-	p->side = hit.side;
-	memcpy(p->n, &m->element.normal[3 * (size_t)p->element], sizeof p->n);
-	memcpy(p->w, hit.w, sizeof p->w);
-	p->cosine = fabs(v3_dot(p->n, dir));
-	p->way = hit.t;
-	return 1;
-}
-
-/* The point itself, from the corners: closer to the plane than along the ray. */
-static void ray_locate(const struct view_scene *v, struct point *p)
-{
-	const uint32_t *c = &v->m->element.corner[3 * (size_t)p->element];
-
-	for (size_t k = 0; k < 3; k++)
-		p->x[k] = p->w[0] * v->m->vertex[3 * (size_t)c[0] + k] +
-		          p->w[1] * v->m->vertex[3 * (size_t)c[1] + k] +
-		          p->w[2] * v->m->vertex[3 * (size_t)c[2] + k];
-}
-
-static void leave(const struct view_scene *v, const struct point *p, int side,
-                  double x[3])
-{
-	double n[3];
-
-	for (int k = 0; k < 3; k++)
-		n[k] = side == FRONT ? p->n[k] : -p->n[k];
-	memcpy(x, p->x, sizeof p->x);
-	ray_leave(v->rays, n, x);
-}
-
-/* As meet, going through the backs of one-sided materials if `passes`. Returns 0
- * where nothing, or only a black back, is met. */
-static int see(const struct view_scene *v, const double org[3], const double dir[3],
-               int passes, struct point *p, uint64_t *rays)
-{
-	double from[3];
-
-	++*rays;
-	if (!meet(v, org, dir, p))
-		return 0;
-	for (int i = 0; v->side[2 * p->material + (uint32_t)p->side].black; i++) {
-		if (!passes || i == PASSES_MAX)
-			return 0;
-		ray_locate(v, p);
-		leave(v, p, FRONT, from);
-		++*rays;
-		if (!meet(v, from, dir, p))
-			return 0;
-	}
-	return 1;
-}
-
 /* Has the rest of the light at a point computed and added later. */
-static void put_request(struct view_walker *w, const struct view_branch *b, struct point *p)
+static void put_request(struct view_walker *w, const struct view_branch *b, struct view_point *p)
 {
 	struct view_request q = { .element = p->element, .side = p->side, .slot = w->slot,
 	                          .material = p->material, .directional = b->depth > 0,
 	                          .seed = b->seed + b->index };
 
-	ray_locate(w->v, p);
+	view_locate(w->v, p);
 	memcpy(q.x, p->x, sizeof q.x);
 	memcpy(q.w, p->w, sizeof q.w);
 	view_shade_tile_put(w->shader, &q, b->weight);
 }
 
 /* Adds the error of the interpolated light that a side shows. */
-static void add_error(struct view_walker *w, const struct view_branch *b, const struct point *p)
+static void add_error(struct view_walker *w, const struct view_branch *b, const struct view_point *p)
 {
-	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
+	const struct view_side *s = view_side_at(w->v, p);
 	size_t bands = (size_t)w->v->m->bands;
 	size_t at = (2 * (size_t)p->element + (size_t)p->side) * bands;
 	size_t far = (2 * (size_t)p->element + (size_t)!p->side) * bands;
@@ -136,24 +59,24 @@ static void add_error(struct view_walker *w, const struct view_branch *b, const 
 
 /* What counts of an emitter that a sample of a lobe has met: it may be found by aiming, too. */
 static double aimed_share(const struct view_walker *w, const struct view_branch *b,
-                          const struct point *p)
+                          const struct view_point *p)
 {
 	const struct emitter_images *s = &w->v->images;
 
-	if (!b->lobes || b->straight || b->turns < 0 || !(w->aim.sum > 0))
+	if (!b->lobes || !b->aim.tree || b->chain < 0)
 		return 1;
 	uint32_t emitter = s->of[2 * p->element + (uint32_t)p->side];
 	if (emitter == UINT32_MAX)
 		return 1;
-	size_t image = (size_t)b->turns * s->emitters.n + emitter;
-	double other = view_emitter_images_density(s, &w->aim, image, b->reach + p->way, p->cosine);
-	return b->density / (b->density + other);
+	size_t image = (size_t)b->chain * s->emitters.n + emitter;
+	double other = aim_images_density(s, &b->aim, image, b->way + p->way, p->cosine);
+	return b->chance / (b->chance + other);
 }
 
 /* Adds what the point itself sends: emission and M / pi. */
-static void add_radiance(struct view_walker *w, const struct view_branch *b, struct point *p)
+static void add_radiance(struct view_walker *w, const struct view_branch *b, struct view_point *p)
 {
-	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
+	const struct view_side *s = view_side_at(w->v, p);
 	size_t bands = (size_t)w->v->m->bands;
 	double h[BANDS_MAX];
 	double *diffuse = b->depth ? w->directional : w->diffuse;
@@ -185,7 +108,7 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b, str
 
 /* Adds the highlights of punctual lights, which no ray of a lobe can meet. */
 static void add_highlights(struct view_walker *w, const struct view_branch *b,
-                           const struct point *p)
+                           const struct view_point *p)
 {
 	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] }, l[BANDS_MAX];
 
@@ -195,11 +118,11 @@ static void add_highlights(struct view_walker *w, const struct view_branch *b,
 }
 
 /* Follows a finite lobe, by samples or by one ray about its axis. */
-static void branch_into(struct view_walker *w, const struct view_branch *b, const struct point *p,
+static void branch_into(struct view_walker *w, const struct view_branch *b, const struct view_point *p,
                         const struct view_lobe *lobe, int side, struct view_branch *next)
 {
-	const struct view_side *s = &w->v->side[2 * p->material + (uint32_t)p->side];
-	struct view_lobe_seen l = { .k = lobe->k, .cosine = fmax(p->cosine, cosine_least),
+	const struct view_side *s = view_side_at(w->v, p);
+	struct aim_lobe l = { .k = lobe->k, .cosine = fmax(p->cosine, cosine_least),
 	                            .element = p->element, .side = side, .table = &lobe->table };
 	double scale = w->v->m->lobe == LOBE_RECIPROCAL ? bsdf_lobe_albedo(lobe->k, p->cosine) : 1;
 
@@ -207,10 +130,15 @@ static void branch_into(struct view_walker *w, const struct view_branch *b, cons
 	memcpy(l.x, p->x, sizeof l.x);
 	for (int k = 0; k < 3; k++)
 		l.normal[k] = side == FRONT ? p->n[k] : -p->n[k];
-	if (w->o->lobe_samples || b->lobes) {
+	if (b->lobes) {
+		view_lobe_go_on(w, b, &l, lobe->coefficient, next);
+		return;
+	}
+	if (w->o->lobe_samples) {
 		interp_reconstruction_at(&w->v->all, p->element, p->side, p->w, l.other);
 		for (int i = 0; i < w->v->m->bands; i++)
 			l.other[i] = b->weight[i] * s->here[i] * l.other[i] + w->directional[i];
+		l.id = 2 * (2 * p->material + (uint32_t)p->side) + (side != p->side);
 		view_lobe_follow(w, b, &l, lobe->coefficient, next);
 		return;
 	}
@@ -222,85 +150,144 @@ static void branch_into(struct view_walker *w, const struct view_branch *b, cons
 	view_push(w, b, next, lobe->coefficient, scale);
 }
 
-/* How a mirror has turned what met none before: branches' `turns`. */
-static int turned(const struct view_scene *v, const struct point *p)
+/* The chain of a branch that a mirror turns: branches' `chain`. */
+static int32_t turned(const struct view_scene *v, const struct view_branch *b,
+                      const struct view_point *p)
 {
-	int plane = view_emitter_images_plane(&v->images, p->material, p->side, p->n, p->x);
+	const struct emitter_images *s = &v->images;
+	int plane = b->chain < 0 || !b->aim.tree
+	          ? -1 : aim_images_plane(s, p->material, p->side, p->n, p->x);
 
-	return plane < 0 ? -1 : 1 + plane;
+	return plane < 0 ? -1 : s->turn[(size_t)b->chain * s->mirrors.n + (size_t)plane];
 }
 
 /* Follows one directional part of a point: `through` 0 for reflection into the side
  * seen, 1 for light that comes from the other side. */
 static void branch_off(struct view_walker *w, const struct view_branch *b,
-                       const struct point *p, const struct view_lobe *lobe, int through)
+                       const struct view_point *p, const struct view_lobe *lobe, int through)
 {
-	struct view_branch next = { .lobes = b->lobes, .density = b->density, .share = b->share,
-	                            .index = b->index, .reach = b->lobes ? b->reach + p->way : 0,
-	                            .turns = b->turns, .aimed = b->aimed };
+	struct view_branch next = { .lobes = b->lobes, .index = b->index,
+	                            .seed = rng_mix(b->seed + 1 + (uint64_t)through) };
 	int side = through ? !p->side : p->side, ideal = isinf(lobe->k);
 
 	if (through)
 		memcpy(next.dir, b->dir, sizeof next.dir);
 	else
 		v3_mad(b->dir, -2 * v3_dot(b->dir, p->n), p->n, next.dir);
-	leave(w->v, p, side, next.org);
+	view_leave(w->v, p, side, next.org);
 	next.passes = through && ideal && b->passes;
-	next.seed = rng_mix(b->seed + 1 + (uint64_t)through);
-	if (b->lobes && (!ideal || !through))
-		next.turns = ideal && b->turns == 0 ? turned(w->v, p) : -1;
-	if (ideal)
-		view_push(w, b, &next, lobe->coefficient, 1);
-	else if (!w->asking || !w->o->lobe_samples)
-		branch_into(w, b, p, lobe, side, &next);
+	if (b->lobes) {
+		next.density = b->density;
+		next.reach = b->reach + p->way;
+		next.worth = b->worth;
+	}
+	if (!ideal) {
+		if (!w->asking || !w->o->lobe_samples)
+			branch_into(w, b, p, lobe, side, &next);
+		return;
+	}
+	if (b->lobes) {
+		next.aim = b->aim;
+		next.chance = b->chance;
+		next.way = b->way + p->way;
+		next.chain = through ? b->chain : turned(w->v, b, p);
+	}
+	view_push(w, b, &next, lobe->coefficient, 1);
 }
 
-/* Goes on along the one way that leads to an image; adds its emitter at the end. */
-static void follow_aimed(struct view_walker *w, const struct view_branch *b, struct point *p)
+/* The most that a lobe leaves of a branch in any band. */
+static double carries(const struct view_branch *b, const struct view_lobe *lobe, int bands)
 {
-	const struct emitter_images *s = &w->v->images;
-	const struct view_side *seen = &w->v->side[2 * p->material + (uint32_t)p->side];
-	size_t image = b->aimed - 1;
-	int plane = (int)(image / s->emitters.n) - 1;
-	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] }, l[BANDS_MAX];
+	double most = 0;
 
-	ray_locate(w->v, p);
-	if (b->turns == 0 && plane >= 0 &&
-	    view_emitter_images_plane(s, p->material, p->side, p->n, p->x) == plane) {
-		branch_off(w, b, p, &seen->reflected, 0);
-	} else if (s->of[2 * p->element + (uint32_t)p->side] == image % s->emitters.n) {
-		if (b->straight || b->turns != plane + 1)
-			return;
-		bsdf_emission(w->v->m, p->material, p->n, out, l);
-		for (int i = 0; i < w->v->m->bands; i++)
-			w->directional[i] += b->weight[i] * l[i];
-	} else if (seen->transmitted.coefficient && isinf(seen->transmitted.k)) {
-		branch_off(w, b, p, &seen->transmitted, 1);
-	}
+	for (int i = 0; i < bands && lobe->coefficient; i++)
+		most = fmax(most, b->weight[i] * lobe->coefficient[i]);
+	return most;
+}
+
+/* Goes on behind a lobe that is sampled: one way, chosen by what it carries, and the less that is
+ * the less often. */
+static void go_on(struct view_walker *w, const struct view_branch *b, const struct view_point *p,
+                  const struct view_side *s)
+{
+	struct view_branch one = *b;
+	double reflected = carries(b, &s->reflected, w->v->m->bands);
+	double all = reflected + carries(b, &s->transmitted, w->v->m->bands);
+	double follow = fmin(1, all / b->worth);
+	uint64_t seed = rng_mix(b->seed);
+	double u = rng_sobol(rng_shuffle(b->index, seed), 0, seed);
+
+	if (!(u < follow))
+		return;
+	int through = u * all >= reflected * follow;
+	double chance = follow * (through ? all - reflected : reflected) / all;
+	for (int i = 0; i < w->v->m->bands; i++)
+		one.weight[i] /= chance;
+	branch_off(w, &one, p, through ? &s->transmitted : &s->reflected, through);
 }
 
 static void follow_branch(struct view_walker *w, const struct view_branch *b)
 {
 	const struct view_scene *v = w->v;
-	struct point p;
+	struct view_point p;
 
-	if (!see(v, b->org, b->dir, b->passes, &p, &w->rays))
+	if (!view_see(v, b->org, b->dir, b->passes, &p, &w->rays))
 		return;
-	if (b->aimed) {
-		follow_aimed(w, b, &p);
-		return;
-	}
 	add_radiance(w, b, &p);
-	const struct view_side *s = &v->side[2 * p.material + (uint32_t)p.side];
+	const struct view_side *s = view_side_at(v, &p);
 	if (!s->reflected.coefficient && !s->transmitted.coefficient)
 		return;
-	ray_locate(v, &p);
+	view_locate(v, &p);
 	if (v->highlights)
 		add_highlights(w, b, &p);
+	if (b->lobes) {
+		go_on(w, b, &p, s);
+		return;
+	}
 	if (s->reflected.coefficient)
 		branch_off(w, b, &p, &s->reflected, 0);
 	if (s->transmitted.coefficient)
 		branch_off(w, b, &p, &s->transmitted, 1);
+}
+
+int view_aimed(struct view_walker *w, const struct view_branch *from, const double dir[3],
+               uint32_t image, double *value)
+{
+	const struct emitter_images *s = &w->v->images;
+	int32_t chain = 0, wanted = (int32_t)(image / s->emitters.n);
+	double at[3], to[3], l[BANDS_MAX];
+	struct view_point p;
+
+	memcpy(at, from->org, sizeof at);
+	memcpy(to, dir, sizeof to);
+	for (int events = 0; from->depth + events <= w->o->depth; events++) {
+		if (!view_see(w->v, at, to, 0, &p, &w->rays))
+			return 0;
+		const struct view_side *side = view_side_at(w->v, &p);
+		double out[3] = { -to[0], -to[1], -to[2] };
+		if (chain == wanted &&
+		    s->of[2 * p.element + (uint32_t)p.side] == image % s->emitters.n) {
+			bsdf_emission(w->v->m, p.material, p.n, out, l);
+			for (int i = 0; i < w->v->m->bands; i++)
+				value[i] *= l[i];
+			return events ? VIEW_AIMED_ROUND : VIEW_AIMED_STRAIGHT;
+		}
+		view_locate(w->v, &p);
+		int plane = chain == wanted ? -1 : aim_images_plane(s, p.material, p.side, p.n, p.x);
+		int32_t next = chain == wanted ? -1 : aim_images_next(s, chain, wanted);
+		int turns = plane >= 0 && s->turn[(size_t)chain * s->mirrors.n + (size_t)plane] == next;
+		const struct view_lobe *way = turns ? &side->reflected : &side->transmitted;
+		if (!way->coefficient || !isinf(way->k))
+			return 0;
+		if (turns) {
+			chain = next;
+			v3_mad(to, -2 * v3_dot(to, p.n), p.n, to);
+		}
+		for (int i = 0; i < w->v->m->bands; i++)
+			value[i] *= way->coefficient[i];
+		view_leave(w->v, &p, turns ? p.side : !p.side, at);
+	}
+	return 0;
 }
 
 void view_follow(struct view_walker *w, struct view_branch *b)
@@ -309,7 +296,6 @@ void view_follow(struct view_walker *w, struct view_branch *b)
 		b->weight[i] = 1;
 	b->depth = b->lobes = b->straight = 0;
 	b->passes = 1;
-	b->share = 1;
 	w->step = follow_branch;
 	follow_branch(w, b);
 	view_run(w, 0);
@@ -318,13 +304,13 @@ void view_follow(struct view_walker *w, struct view_branch *b)
 void view_first_seen(const struct view_scene *v, const double org[3], const double dir[3],
                      struct view_first *first)
 {
-	struct point p;
+	struct view_point p;
 	uint64_t rays = 0;
 
 	first->element = RAY_MISS;
-	if (!see(v, org, dir, 1, &p, &rays))
+	if (!view_see(v, org, dir, 1, &p, &rays))
 		return;
-	ray_locate(v, &p);
+	view_locate(v, &p);
 	first->element = p.element;
 	memcpy(first->point, p.x, sizeof p.x);
 	for (int k = 0; k < 3; k++)

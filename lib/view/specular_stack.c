@@ -20,7 +20,7 @@ void view_push(struct view_walker *w, const struct view_branch *b, struct view_b
 		next->weight[i] = b->weight[i] * coefficient[i] * scale;
 		most = fmax(most, next->weight[i]);
 	}
-	if (next->depth <= w->o->depth && most >= w->o->cutoff * next->share && most > 0) {
+	if (next->depth <= w->o->depth && most > 0 && (next->lobes || most >= w->o->cutoff)) {
 		w->stack[w->waiting++] = *next;
 		return;
 	}

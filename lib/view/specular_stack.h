@@ -10,18 +10,18 @@
 struct view_branch {
 	double org[3], dir[3];
 	double weight[BANDS_MAX];   /* what of its radiance reaches the pixel */
-	double share;               /* one over the samples it stands among */
 	int depth;                  /* directional events behind it */
 	int passes;                 /* goes through backs of one-sided materials */
+	uint32_t index;             /* low-discrepancy point and */
+	uint64_t seed;              /* its order and scramble for the next event */
 	int lobes;                  /* finite lobes behind it that were sampled; of the first: */
 	int straight;               /* has met nothing since */
 	double density;             /* of its direction, by solid angle */
 	double reach;               /* way since */
-	int turns;                  /* it has come by ideal events alone: 0 through panes, 1 + k by
-	                               mirror plane k once; -1 any other way */
-	uint32_t aimed;             /* 1 + the image that it goes to, for nothing else; or 0 */
-	uint32_t index;             /* low-discrepancy point and */
-	uint64_t seed;              /* scramble of its next lobe sample */
+	double worth;               /* what carries less goes on by so much less chance */
+	struct aim aim;             /* of the last: how emitters were aimed at from it, */
+	double chance, way;         /* density of its direction, way since, and */
+	int32_t chain;              /* chain of mirrors it came by (emitter_images.h); -1: other */
 };
 
 struct view_shade_tile;
@@ -29,6 +29,7 @@ struct view_shade_tile;
 struct view_walker {
 	const struct view_scene *v;
 	const struct view_options *o;
+	double *unrest;             /* [4 materials] of lobes that the tile has sampled (glossy.c) */
 	struct view_shade_tile *shader; /* for points and lobes whose light is to be computed; NULL:
 	                               there are none */
 	uint32_t slot;              /* of the sample, that it is told with them */
@@ -39,7 +40,6 @@ struct view_walker {
 	size_t waiting;
 	double diffuse[BANDS_MAX], directional[BANDS_MAX], emission[BANDS_MAX];
 	double lit[BANDS_MAX];      /* by emitters straight to the lobe that is sampled */
-	struct view_aim aim;        /* of that lobe's samples */
 	double error[BANDS_MAX];    /* of interpolated light */
 	double blurred[BANDS_MAX];  /* squares of it, that the samples of a lobe have summed up */
 	double cut[BANDS_MAX];
@@ -54,7 +54,7 @@ struct view_walker {
 size_t view_stack_size(const struct view_options *o);
 
 /* Puts a branch that carries `scale` times `coefficient` of b's weight on the stack, or cuts it
- * and books its bound. One of many samples of a lobe is cut by what all of them carry. */
+ * and books its bound. Behind lobes that are sampled only the depth cuts. */
 void view_push(struct view_walker *w, const struct view_branch *b, struct view_branch *next,
                const double *coefficient, double scale);
 

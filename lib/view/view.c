@@ -51,6 +51,7 @@ struct tile_sum {
 struct worker {
 	struct view_branch *stack;
 	struct view_shade_tile shader;
+	double *unrest;             /* [4 materials] of the tile's lobes, for the walker */
 	struct view_sums slots;     /* [pixels ROUND][bands] */
 	struct view_sums sums;      /* [pixels][bands] */
 	int samples[TILE * TILE];   /* of each pixel so far; negative when it needs no more */
@@ -297,12 +298,13 @@ static void trace_round(const struct render *r, struct worker *k, const struct t
 
 static void trace_tile(const struct render *r, struct worker *k, size_t t)
 {
-	struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack,
+	struct view_walker w = { .v = r->v, .o = r->o, .stack = k->stack, .unrest = k->unrest,
 		                 .shader = shades(r) ? &k->shader : NULL };
 	struct tile tile = tile_at(r, t);
 	struct tile_sum *sum = &r->tile[t];
 
 	memset(k->samples, 0, sizeof k->samples);
+	memset(k->unrest, 0, 4 * r->v->m->material.n * sizeof *k->unrest);
 	memset(k->sums.diffuse, 0, TILE * TILE * SUMS * (size_t)r->v->m->bands * sizeof(double));
 	for (int from = 0, to; from < r->o->samples; from = to) {
 		to = from + ROUND < r->o->samples ? from + ROUND : r->o->samples;
@@ -350,7 +352,8 @@ static int new_worker(const struct render *r, struct worker *k, int thread, stru
 	size_t values = TILE * TILE * (size_t)r->v->m->bands;
 
 	k->stack = mem_new(view_stack_size(r->o), sizeof *k->stack, "ray stacks", e);
-	if (!k->stack || new_sums(&k->slots, ROUND * values, e) || new_sums(&k->sums, values, e))
+	k->unrest = mem_new(r->v->m->material.n, 4 * sizeof *k->unrest, "lobes", e);
+	if (!k->stack || !k->unrest || new_sums(&k->slots, ROUND * values, e) || new_sums(&k->sums, values, e))
 		return -1;
 	if (!shades(r))
 		return 0;
@@ -364,6 +367,7 @@ static void free_workers(struct render *r)
 {
 	for (int t = 0; t < r->o->threads && r->worker; t++) {
 		free(r->worker[t].stack);
+		free(r->worker[t].unrest);
 		free(r->worker[t].slots.diffuse);
 		free(r->worker[t].sums.diffuse);
 		view_shade_tile_free(&r->worker[t].shader);

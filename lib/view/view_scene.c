@@ -228,7 +228,7 @@ struct view_scene *view_scene_new(const struct model *m, const struct solution *
 	v->method = method;
 	if (!tabulate(v, e) && !interpolate(v, s, threads, e) && !find_misses(v, s, threads, e) &&
 	    ((method == VIEW_MESH && !v->lobes) || (v->direct = occ_direct_new(m, rays, e))) &&
-	    (!v->lobes || !view_emitter_images_init(&v->images, m, e)) &&
+	    (!v->lobes || !aim_images_init(&v->images, m, e)) &&
 	    (!v->highlights || !ray_light_visibility_new(m, rays, &v->ways, e))) {
 		if (v->tails)
 			find_ceiling(v);
@@ -248,7 +248,7 @@ void view_scene_free(struct view_scene *v)
 	if (!v)
 		return;
 	occ_direct_free(v->direct);
-	view_emitter_images_free(&v->images);
+	aim_images_free(&v->images);
 	ray_light_visibility_free(&v->ways);
 	interp_reconstruction_free(&v->all);
 	interp_reconstruction_free(&v->part);

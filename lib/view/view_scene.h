@@ -6,7 +6,7 @@
 #include "lib/occlusion/direct.h"
 #include "lib/ray/light_visibility.h"
 #include "lib/scatter/lobe_table.h"
-#include "lib/view/emitter_images.h"
+#include "lib/aim/emitter_images.h"
 #include "lib/view/view.h"
 
 /* What one side of a material does with directional light that leaves it towards

@@ -1,4 +1,4 @@
-#include "lib/view/lobe_weight.h"
+#include "lib/aim/lobe_weight.h"
 
 #include <math.h>
 #include <string.h>
@@ -7,7 +7,7 @@
 #include "lib/base/vec.h"
 #include "lib/scatter/lobe.h"
 
-double view_lobe_per_density(const struct view_lobe_seen *l, enum lobe_kind kind, double cos_i)
+double aim_lobe_per_density(const struct aim_lobe *l, enum lobe_kind kind, double cos_i)
 {
 	return kind == LOBE_RECIPROCAL
 	     ? cos_i / fmax(cos_i, l->cosine)
@@ -15,7 +15,7 @@ double view_lobe_per_density(const struct view_lobe_seen *l, enum lobe_kind kind
 	       bsdf_lobe_table_normaliser(l->table, cos_i);
 }
 
-double view_lobe_density(const struct view_lobe_seen *l, enum lobe_kind kind, const double dir[3])
+double aim_lobe_density(const struct aim_lobe *l, enum lobe_kind kind, const double dir[3])
 {
 	double power = bsdf_lobe_power(l->k, v3_dot(l->axis, dir));
 
@@ -23,9 +23,9 @@ double view_lobe_density(const struct view_lobe_seen *l, enum lobe_kind kind, co
 	                               : power / bsdf_lobe_table_normaliser(l->table, l->cosine);
 }
 
-double view_lobe_weight_at(const double dir[3], const void *arg)
+double aim_lobe_weight_at(const double dir[3], const void *arg)
 {
-	const struct view_lobe_weight *w = arg;
+	const struct aim_lobe_weight *w = arg;
 	double cos_i = v3_dot(w->l->normal, dir);
 	double power = bsdf_lobe_power(w->l->k, v3_dot(w->l->axis, dir));
 
@@ -36,13 +36,13 @@ double view_lobe_weight_at(const double dir[3], const void *arg)
 	     : power * cos_i / (w->l->cosine * bsdf_lobe_table_normaliser(w->l->table, cos_i));
 }
 
-struct direct_weight view_lobe_weight(const struct view_lobe_weight *w)
+struct direct_weight aim_lobe_weight(const struct aim_lobe_weight *w)
 {
 	/* cos^k falls to exp(-1/2) over its width, and at its reach to what no picture shows,
 	 * exp(-18.4) = 1e-8. k = 0 reaches everywhere. */
 	static const double logarithm_at_reach = -18.4, k_least = 1e-9;
 	double cos_reach = exp(logarithm_at_reach / fmax(w->l->k, k_least));
-	struct direct_weight d = { .at = view_lobe_weight_at, .arg = w,
+	struct direct_weight d = { .at = aim_lobe_weight_at, .arg = w,
 	                           .width = 1 / sqrt(w->l->k + 1), .reach = acos(cos_reach) };
 
 	memcpy(d.axis, w->l->axis, sizeof d.axis);
