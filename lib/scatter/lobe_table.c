@@ -5,8 +5,8 @@
 #include "lib/scatter/lobe.h"
 
 /* An exponent: lobes of smaller ones have a normaliser that is not smooth at cosine 1, where it
- * differs from N_k(0) as sin^(k+1), and are not interpolated. A guess, which unit test lobe checks
- * with LOBE_TABLE. */
+ * differs from N_k(0) as sin^(k+1): it is as (1 - cosine)^(1/4) in steps of that. A guess, which
+ * unit test lobe checks with LOBE_TABLE. */
 static const double sharp_from = 5;
 
 /* The sine, times sqrt(k + 1), of the angle where cos^k has fallen to e^-18 = 2e-8: what the
@@ -18,12 +18,12 @@ void bsdf_lobe_table_make(struct lobe_table *t, double k)
 	t->k = k;
 	t->whole = bsdf_lobe_normaliser(k, 1);
 	/* The horizon cuts off cos^k of more than the angle whose sine is `end`. */
-	t->end = fmin(1, reach / sqrt(k + 1));
+	t->end = k < sharp_from ? 1 : fmin(1, reach / sqrt(k + 1));
 	t->per_step = LOBE_TABLE / t->end;
-	if (k < sharp_from)
-		return;
 	for (int i = 0; i <= LOBE_TABLE + 2; i++) {
 		double c = (i - 1) / t->per_step;
+		if (k < sharp_from)
+			c = 1 - c * c * c * c;
 		/* What a lobe below the horizon loses, one above it has. */
 		t->value[i] = c < 0 ? t->whole - bsdf_lobe_normaliser(k, -c)
 		                    : bsdf_lobe_normaliser(k, fmin(1, c));
@@ -32,11 +32,11 @@ void bsdf_lobe_table_make(struct lobe_table *t, double k)
 
 double bsdf_lobe_table_normaliser(const struct lobe_table *t, double cos_theta)
 {
-	if (t->k < sharp_from)
-		return bsdf_lobe_normaliser(t->k, cos_theta);
 	if (cos_theta >= t->end)
 		return t->whole;
-	double at = cos_theta * t->per_step, i = fmin(floor(at), LOBE_TABLE - 1), u = at - i;
+	double at = t->k < sharp_from ? sqrt(sqrt(1 - cos_theta)) : cos_theta;
+	at *= t->per_step;
+	double i = fmin(floor(at), LOBE_TABLE - 1), u = at - i;
 	const double *p = &t->value[(int)i];
 	/* The cubic through four values (Lagrange). */
 	return (-p[0] * u * (u - 1) * (u - 2) + 3 * p[1] * (u + 1) * (u - 1) * (u - 2) -

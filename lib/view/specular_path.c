@@ -106,15 +106,15 @@ static void add_radiance(struct view_walker *w, const struct view_branch *b, str
 		emission[i] += b->weight[i] * share * h[i];
 }
 
-/* Adds the highlights of punctual lights, which no ray of a lobe can meet. */
+/* Adds the highlights of punctual lights in a lobe. */
 static void add_highlights(struct view_walker *w, const struct view_branch *b,
-                           const struct view_point *p)
+                           const struct aim_lobe *l, const double *coefficient)
 {
-	double out[3] = { -b->dir[0], -b->dir[1], -b->dir[2] }, l[BANDS_MAX];
+	double light[BANDS_MAX];
 
-	view_highlights(w->v, p->material, p->x, p->n, out, l, &w->rays);
+	view_highlights(w->v, l, light, &w->rays);
 	for (int i = 0; i < w->v->m->bands; i++)
-		w->directional[i] += b->weight[i] * l[i];
+		w->directional[i] += b->weight[i] * coefficient[i] * light[i];
 }
 
 /* Follows a finite lobe, by samples or by one ray about its axis. */
@@ -130,6 +130,8 @@ static void branch_into(struct view_walker *w, const struct view_branch *b, cons
 	memcpy(l.x, p->x, sizeof l.x);
 	for (int k = 0; k < 3; k++)
 		l.normal[k] = side == FRONT ? p->n[k] : -p->n[k];
+	if (w->v->highlights)
+		add_highlights(w, b, &l, lobe->coefficient);
 	if (b->lobes) {
 		view_lobe_go_on(w, b, &l, lobe->coefficient, next);
 		return;
@@ -238,8 +240,6 @@ static void follow_branch(struct view_walker *w, const struct view_branch *b)
 	if (!s->reflected.coefficient && !s->transmitted.coefficient)
 		return;
 	view_locate(v, &p);
-	if (v->highlights)
-		add_highlights(w, b, &p);
 	if (b->lobes) {
 		go_on(w, b, &p, s);
 		return;
