@@ -68,6 +68,7 @@ static void make_leaf(const struct builder *b, uint32_t light, struct light_node
 	to->radius = f->radius;
 	to->cosine = 1;
 	to->power = b->power[light];
+	to->area = f->area;
 	to->light = light;
 }
 
@@ -133,6 +134,7 @@ static uint32_t build(struct builder *b, size_t from, size_t n, uint32_t parent)
 	join_spheres(&both, &b->t->node[second]);
 	join_cones(&both, &b->t->node[second]);
 	both.power += b->t->node[second].power;
+	both.area += b->t->node[second].area;
 	both.second = second;
 	both.parent = parent;
 	*to = both;
@@ -203,8 +205,8 @@ static double cosine_within(double cos_a, double cos_b)
 	return cos_a * cos_b + sqrt(fmax(0, 1 - cos_a * cos_a) * (1 - cos_b * cos_b));
 }
 
-/* About the radiance that a lobe of unit coefficient makes of a node if nothing is in the way:
- * where all of it were where it is best. Never 0 where there is any. */
+/* About the radiance that a lobe of unit coefficient makes of a node if nothing is in the way,
+ * all of it being where it is best: no more than that of its lights. Never 0 where there is any. */
 static double bound(const struct light_node *t, const struct light_lobe *l)
 {
 	double d[3], r2 = t->radius * t->radius;
@@ -214,7 +216,7 @@ static double bound(const struct light_node *t, const struct light_lobe *l)
 	if (v3_dot(l->normal, d) + t->radius <= 0)
 		return 0;
 	if (way2 <= r2)
-		return t->power / (PI * r2);
+		return t->power / t->area;
 	double wide = sqrt(1 - r2 / way2); /* cosine of half the angle it is seen at */
 	double there = -v3_dot(t->axis, d) / way, sends = cosine_within(there, fmax(0, t->cosine));
 	if (t->cosine <= 0 || !(wide > 0))
@@ -225,7 +227,7 @@ static double bound(const struct light_node *t, const struct light_lobe *l)
 		return 0;
 	double off = cosine_within(v3_dot(l->axis, d) / way, wide);
 	double lobe = (l->k + 1) / (2 * PI) * bsdf_lobe_power(l->k, off);
-	return t->power * sends / way2 * fmin(lobe, way2 / (PI * r2));
+	return t->power * sends * fmin(lobe / way2, 1 / t->area);
 }
 
 int aim_tree_worth(const struct light_tree *t, const struct light_lobe *l, double enough)

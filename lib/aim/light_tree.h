@@ -17,7 +17,7 @@
 struct light_node {
 	double centre[3], radius;   /* of a sphere that holds all below */
 	double axis[3], cosine;     /* of a cone that holds all normals; its half angle's, -1: any */
-	double power;               /* radiance along the normal times area */
+	double power, area;         /* power: radiance along the normal times area */
 	uint32_t second;            /* 0: a light */
 	uint32_t light;
 	uint32_t parent;            /* the root's is itself */

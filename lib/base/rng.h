@@ -83,7 +83,11 @@ static inline double rng_scramble(uint32_t bits, uint32_t seed)
  * another in the next. */
 static inline uint32_t rng_shuffle(uint32_t index, uint64_t seed)
 {
-	return rng_scramble_bits(rng_reverse_bits(index), (uint32_t)rng_mix(~seed));
+	uint32_t key = (uint32_t)rng_mix(~seed);
+	/* The first 2^16 stay among themselves, so that few bits of them are set. */
+	uint32_t block = rng_scramble_bits(0, key) & 0xffff0000u;
+
+	return rng_scramble_bits(rng_reverse_bits(index), key) ^ block;
 }
 
 #endif

@@ -14,7 +14,7 @@
  * lobes cost in pictures (tests/bench/report). */
 enum {
 	PILOT = 16,            /* that tell how many the first lobe of its kind in a tile takes */
-	FEWEST = 1, MOST = 64, /* of a part where an error is aimed at */
+	FEWEST = 4, MOST = 64, /* of a part where an error is aimed at */
 	PROBES = 8             /* of each of two parts that tell how far one ray is off */
 };
 
@@ -25,15 +25,16 @@ static const double together = .8;
 
 /* Images of emitters are aimed at if they may bring such a part of the pixel's light: a guess,
  * less than the noise of samples that stop at an error of 5 %. */
-static const double worth_aiming = .01;
+static const double worth_aiming = .02;
 
 /* What a lobe behind one that is sampled carries less than, relative to that one, goes on by as much
  * less chance. A guess. */
 static const double worth_following = .25;
 
 /* How far what tells of later lobes of a kind moves towards what the last one told: the mean of about
- * the last four, those of the pixel. A guess. */
-static const double forgets = .25;
+ * the last two, which are of the same pixel as a rule. Of .25, .5 and .75 the first two were alike on
+ * scenes/two-pass.gltf, and .75 a tenth noisier. */
+static const double forgets = .5;
 
 /* Sums over the samples of a part. */
 struct part {
@@ -54,23 +55,25 @@ struct run {
 
 /* ---- one sample ---- */
 
-/* Numbers of sample `next->index` of a lobe: a direction of it, and what is aimed at. */
-static double number(const struct view_branch *next, int dim)
+/* The most that a lobe lets through of a branch in any band. */
+static double carried(const struct view_walker *w, const struct view_branch *b,
+                      const double *coefficient)
 {
-	return rng_sobol(rng_shuffle(next->index, next->seed), dim, next->seed);
+	double most = 0;
+
+	for (int i = 0; i < w->v->m->bands; i++)
+		most = fmax(most, b->weight[i] * coefficient[i]);
+	return most;
 }
 
 /* Aims `next`, which is about to leave a lobe, at an image of an emitter. What comes straight to
  * the first lobe is kept apart. */
 static void add_aimed(struct view_walker *w, const struct view_branch *b, const struct aim_lobe *l,
-                      const double *coefficient, const struct view_branch *next)
+                      const double *coefficient, const struct view_branch *next, const double u[3])
 {
 	const struct aim_lobe_weight weight = { l, w->v->m->lobe };
-	double u[3], dir[3], value[BANDS_MAX];
+	double dir[3], value[BANDS_MAX];
 	uint32_t image;
-
-	for (int k = 0; k < 3; k++)
-		u[k] = number(next, 2 + k);
 	double chance = aim_images_aim(&w->v->images, &next->aim, u, dir, &image);
 	double f = chance > 0 ? aim_lobe_weight_at(dir, &weight) : 0;
 	if (!(f > 0))
@@ -89,12 +92,16 @@ static void push_sample(struct view_walker *w, const struct view_branch *b,
                         const struct aim_lobe *l, const double *coefficient,
                         struct view_branch *next)
 {
+	enum { NUMBERS = 5 };  /* of a direction, and of what is aimed at */
 	enum lobe_kind kind = w->v->m->lobe;
-	double u[2] = { number(next, 0), number(next, 1) };
+	uint32_t index = rng_shuffle(next->index, next->seed);
+	double u[NUMBERS];
 
+	for (int k = 0; k < (next->aim.tree ? NUMBERS : 2); k++)
+		u[k] = rng_sobol(index, k, next->seed);
 	next->depth = b->depth + 1;
 	if (next->aim.tree)
-		add_aimed(w, b, l, coefficient, next);
+		add_aimed(w, b, l, coefficient, next, u + 2);
 	if (kind == LOBE_RECIPROCAL)
 		bsdf_lobe_sample_whole(l->k, l->axis, u, next->dir);
 	else
@@ -113,7 +120,9 @@ static void push_sample(struct view_walker *w, const struct view_branch *b,
 void view_lobe_go_on(struct view_walker *w, const struct view_branch *b, const struct aim_lobe *l,
                      const double *coefficient, struct view_branch *next)
 {
-	aim_images_choose(&w->v->images, l, 1, 0, &next->aim);
+	next->shown = b->shown;
+	aim_images_choose(&w->v->images, l, 1, worth_aiming * b->shown / carried(w, b, coefficient),
+	                  &next->aim);
 	push_sample(w, b, l, coefficient, next);
 }
 
@@ -200,15 +209,6 @@ static uint32_t follow_enough(struct run *r)
 	return REPLICATES * each;
 }
 
-static double carried(const struct run *r)
-{
-	double most = 0;
-
-	for (int b = 0; b < r->w->v->m->bands; b++)
-		most = fmax(most, r->b->weight[b] * r->coefficient[b]);
-	return most;
-}
-
 /* Follows as many samples as are asked for, fewer where what is before the lobe has dimmed it;
  * returns their number and in how many parts. */
 static uint32_t follow_all(struct run *r, int *parts)
@@ -219,7 +219,7 @@ static uint32_t follow_all(struct run *r, int *parts)
 		*parts = REPLICATES;
 		return follow_enough(r);
 	}
-	uint32_t n = (uint32_t)fmax(1, fmin(1, carried(r)) * asked + .5);
+	uint32_t n = (uint32_t)fmax(1, fmin(1, carried(r->w, r->b, r->coefficient)) * asked + .5);
 	r->first = r->b->index * (uint32_t)asked;
 	*parts = follow_samples(r, n);
 	return n;
@@ -245,12 +245,12 @@ static void put_light(struct run *r, int parts, double n, const double *lit)
 /* What is aimed at has to bring a part of the light of a pixel. */
 static void aim(struct run *r)
 {
-	double other = 0;
-
+	r->next->shown = 0;
 	for (int i = 0; i < r->w->v->m->bands; i++)
-		other += r->l->other[i] / r->w->v->m->bands;
+		r->next->shown += r->l->other[i] / r->w->v->m->bands;
 	r->sampled = view_shade_tile_sampled(r->w->shader, 2 * r->l->element + (uint32_t)r->l->side);
-	aim_images_choose(&r->w->v->images, r->l, r->sampled, worth_aiming * other / carried(r),
+	aim_images_choose(&r->w->v->images, r->l, r->sampled,
+	                  worth_aiming * r->next->shown / carried(r->w, r->b, r->coefficient),
 	                  &r->next->aim);
 }
 
@@ -266,7 +266,7 @@ void view_lobe_follow(struct view_walker *w, const struct view_branch *b, const 
 	memset(w->cut, 0, sizeof w->cut);
 	memset(w->blurred, 0, sizeof w->blurred);
 	next->lobes = next->straight = 1;
-	next->worth = worth_following * carried(&r);
+	next->worth = worth_following * carried(w, b, coefficient);
 	aim(&r);
 	uint32_t n = follow_all(&r, &parts);
 	for (int k = 0; k < w->v->m->bands; k++) {
@@ -296,7 +296,7 @@ void view_lobe_probe(struct view_walker *w, const struct view_branch *b, const s
 	memset(w->lit, 0, sizeof w->lit);
 	next.lobes = next.straight = 1;
 	next.density = aim_lobe_density(l, w->v->m->lobe, l->axis);
-	next.worth = worth_following * carried(&r);
+	next.worth = worth_following * carried(w, b, coefficient);
 	view_push(w, b, &next, coefficient, scale);
 	view_run(w, below);
 	for (int k = 0; k < w->v->m->bands; k++)

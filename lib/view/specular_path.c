@@ -182,6 +182,7 @@ static void branch_off(struct view_walker *w, const struct view_branch *b,
 		next.density = b->density;
 		next.reach = b->reach + p->way;
 		next.worth = b->worth;
+		next.shown = b->shown;
 	}
 	if (!ideal) {
 		if (!w->asking || !w->o->lobe_samples)
@@ -207,25 +208,24 @@ static double carries(const struct view_branch *b, const struct view_lobe *lobe,
 	return most;
 }
 
-/* Goes on behind a lobe that is sampled: one way, chosen by what it carries, and the less that is
- * the less often. */
+/* Goes on behind a lobe that is sampled, each way by as much less chance as it carries less than
+ * is worth it: of a sample's branches about 1 / worth_following are alive at any time. */
 static void go_on(struct view_walker *w, const struct view_branch *b, const struct view_point *p,
                   const struct view_side *s)
 {
-	struct view_branch one = *b;
-	double reflected = carries(b, &s->reflected, w->v->m->bands);
-	double all = reflected + carries(b, &s->transmitted, w->v->m->bands);
-	double follow = fmin(1, all / b->worth);
 	uint64_t seed = rng_mix(b->seed);
-	double u = rng_sobol(rng_shuffle(b->index, seed), 0, seed);
+	uint32_t index = rng_shuffle(b->index, seed);
 
-	if (!(u < follow))
-		return;
-	int through = u * all >= reflected * follow;
-	double chance = follow * (through ? all - reflected : reflected) / all;
-	for (int i = 0; i < w->v->m->bands; i++)
-		one.weight[i] /= chance;
-	branch_off(w, &one, p, through ? &s->transmitted : &s->reflected, through);
+	for (int through = 0; through < 2; through++) {
+		const struct view_lobe *lobe = through ? &s->transmitted : &s->reflected;
+		double chance = fmin(1, carries(b, lobe, w->v->m->bands) / b->worth);
+		struct view_branch one = *b;
+		if (!(chance > 0) || (chance < 1 && rng_sobol(index, through, seed) >= chance))
+			continue;
+		for (int i = 0; i < w->v->m->bands; i++)
+			one.weight[i] /= chance;
+		branch_off(w, &one, p, lobe, through);
+	}
 }
 
 static void follow_branch(struct view_walker *w, const struct view_branch *b)

@@ -1,7 +1,7 @@
 /* Following one camera ray and its specular tail: the recursion of equation (1) (view.h). Each
  * surface met adds weight (L_e + M / pi); each of its lobes goes on as a branch whose weight
  * is that of the ray so far times f_s cos / density (1 for an ideal event, times its
- * coefficient). Behind a lobe that is sampled one lobe goes on, chosen by chance. */
+ * coefficient). Behind a lobe that is sampled, what carries little goes on by chance. */
 #ifndef TWOPASS_SPECULAR_PATH_H
 #define TWOPASS_SPECULAR_PATH_H
 

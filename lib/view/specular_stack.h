@@ -19,6 +19,7 @@ struct view_branch {
 	double density;             /* of its direction, by solid angle */
 	double reach;               /* way since */
 	double worth;               /* what carries less goes on by so much less chance */
+	double shown;               /* radiance that the pixel shows beside, about */
 	struct aim aim;             /* of the last: how emitters were aimed at from it, */
 	double chance, way;         /* density of its direction, way since, and */
 	int32_t chain;              /* chain of mirrors it came by (emitter_images.h); -1: other */
