@@ -48,6 +48,12 @@ struct tile_sum {
 	                                 radiance, squared errors, number */
 };
 
+/* 1 if a round of samples tells how many a pixel takes. */
+static int pilots(const struct view_options *o)
+{
+	return o->relative > 0 && o->samples > ROUND;
+}
+
 /* A thread's scratch space: pixels of one tile at a time. */
 struct worker {
 	struct view_branch *stack;
@@ -55,7 +61,7 @@ struct worker {
 	double *unrest;             /* [4 materials] of the tile's lobes, for the walker */
 	struct view_sums slots;     /* [pixels ROUND][bands] */
 	struct view_sums sums;      /* [pixels][bands] */
-	int samples[TILE * TILE];   /* of each pixel so far; negative when it needs no more */
+	int samples[TILE * TILE];   /* that each pixel takes */
 };
 
 struct render {
@@ -64,7 +70,7 @@ struct render {
 	const struct view_options *o;
 	struct image *picture;
 	struct view_planes at;
-	double (*spot)[2];          /* [samples] positions in the pixel */
+	double (*spot)[2];          /* [samples, and of a pilot] positions in the pixel */
 	struct worker *worker;      /* [threads] */
 	struct gather *gather;
 	struct tile_sum *tile;
@@ -209,17 +215,22 @@ static double sampling_variance(const struct view_sums *sums, size_t at, double 
 	return sums->square[at] / (n * n) + (n > 1 ? stratified * spread / ((n - 1) * sqrt(n)) : 0);
 }
 
-/* Is what sampling leaves of a pixel's error as small as is wanted? */
-static int done(const struct render *r, const struct view_sums *sums, size_t pixel, double n)
+/* Samples that a pixel takes until what sampling leaves of its error is as small as is wanted, by
+ * what ROUND others of it, whose sums these are, have told. */
+static int wanted(const struct render *r, const struct view_sums *sums, size_t pixel)
 {
 	size_t bands = (size_t)r->v->m->bands;
+	int n = ROUND;
 
-	for (size_t at = pixel * bands; at < (pixel + 1) * bands && r->o->relative > 0; at++) {
-		double mean = shown(sums, at) / n;
-		if (sampling_variance(sums, at, n) > r->o->relative * r->o->relative * mean * mean)
-			return 0;
+	for (size_t at = pixel * bands; at < (pixel + 1) * bands; at++) {
+		double mean = shown(sums, at) / ROUND, light = sums->square[at] / ROUND;
+		double spread = fmax(0, sums->spread[at] / ROUND - mean * mean) * ROUND / (ROUND - 1);
+		double aim = r->o->relative * mean;
+		while (n < r->o->samples &&
+		       light / n + stratified * spread / (n * sqrt(n)) > aim * aim)
+			n += ROUND;
 	}
-	return r->o->relative > 0;
+	return n < r->o->samples ? n : r->o->samples;
 }
 
 /* Squared standard error of the mean of n samples in band k: of interpolated light, of sampling,
@@ -275,15 +286,14 @@ static void store_pixel(const struct render *r, const struct view_walker *w,
 		store_first(r, id, i + .5, j + .5);
 }
 
-/* Traces samples [from, to) of the pixels of a tile that are still wanted: their number is
- * `from` so far. */
+/* Traces samples [from, to) of the pixels of a tile that want more than `have` and adds them up. */
 static void trace_round(const struct render *r, struct worker *k, const struct tile *tile,
-                        struct view_walker *w, int from, int to)
+                        struct view_walker *w, int have, int from, int to)
 {
 	size_t bands = (size_t)r->v->m->bands;
 
 	for (int p = 0; p < tile->pixels; p++)
-		for (int s = from; s < to && k->samples[p] == from; s++) {
+		for (int s = from; s < to && k->samples[p] > have; s++) {
 			w->slot = (uint32_t)(p * ROUND + s - from);
 			follow_sample(r, w, tile->x + p % tile->wide, tile->y + p / tile->wide, s);
 			keep_sample(w, bands, &k->slots);
@@ -291,10 +301,29 @@ static void trace_round(const struct render *r, struct worker *k, const struct t
 	if (w->shader)
 		view_shade_tile_run(w->shader, &k->slots);
 	for (int p = 0; p < tile->pixels; p++)
-		if (k->samples[p] == from) {
+		if (k->samples[p] > have)
 			add_round(&k->slots, (size_t)p, to - from, bands, &k->sums);
-			k->samples[p] = done(r, &k->sums, (size_t)p, to) ? -to : to;
-		}
+}
+
+static void clear_sums(const struct render *r, struct worker *k)
+{
+	memset(k->sums.diffuse, 0, TILE * TILE * SUMS * (size_t)r->v->m->bands * sizeof(double));
+}
+
+/* Settles how many samples each pixel of a tile takes: where an error is asked for, by a round of
+ * samples that are not kept. Those that are must not decide it: where all have missed what is
+ * seldom met they would be thought enough. */
+static void plan_samples(const struct render *r, struct worker *k, const struct tile *tile,
+                         struct view_walker *w)
+{
+	for (int p = 0; p < tile->pixels; p++)
+		k->samples[p] = r->o->samples;
+	if (!pilots(r->o))
+		return;
+	trace_round(r, k, tile, w, 0, r->o->samples, r->o->samples + ROUND);
+	for (int p = 0; p < tile->pixels; p++)
+		k->samples[p] = wanted(r, &k->sums, (size_t)p);
+	clear_sums(r, k);
 }
 
 static void trace_tile(const struct render *r, struct worker *k, size_t t)
@@ -304,15 +333,15 @@ static void trace_tile(const struct render *r, struct worker *k, size_t t)
 	struct tile tile = tile_at(r, t);
 	struct tile_sum *sum = &r->tile[t];
 
-	memset(k->samples, 0, sizeof k->samples);
 	memset(k->unrest, 0, 4 * r->v->m->material.n * sizeof *k->unrest);
-	memset(k->sums.diffuse, 0, TILE * TILE * SUMS * (size_t)r->v->m->bands * sizeof(double));
+	clear_sums(r, k);
+	plan_samples(r, k, &tile, &w);
 	for (int from = 0, to; from < r->o->samples; from = to) {
 		to = from + ROUND < r->o->samples ? from + ROUND : r->o->samples;
-		trace_round(r, k, &tile, &w, from, to);
+		trace_round(r, k, &tile, &w, from, from, to);
 	}
 	for (int p = 0; p < tile.pixels; p++)
-		store_pixel(r, &w, &k->sums, (size_t)p, abs(k->samples[p]), tile.x + p % tile.wide,
+		store_pixel(r, &w, &k->sums, (size_t)p, k->samples[p], tile.x + p % tile.wide,
 		            tile.y + p / tile.wide, sum);
 	for (int b = 0; b < r->v->m->bands; b++)
 		sum->cut += w.cut[b] / r->o->samples;
@@ -400,7 +429,7 @@ static void gather(struct render *r, size_t tiles, const struct progress *progre
 
 static int new_buffers(struct render *r, size_t tiles, struct err *e)
 {
-	int n = r->o->samples;
+	int n = r->o->samples + (pilots(r->o) ? ROUND : 0);
 
 	r->tile = mem_new(tiles, sizeof *r->tile, "tiles", e);
 	r->spot = mem_new((size_t)n, sizeof *r->spot, "pixel samples", e);

@@ -48,7 +48,7 @@ enum { VIEW_LOBE_ENOUGH = -1 };
 
 struct view_options {
 	int samples;       /* of a pixel; 1 = its centre, else stratified over it */
-	double relative;   /* sampling of a pixel stops where its standard error is this times
+	double relative;   /* a pixel takes samples until its standard error is this times
 	                      its radiance, after `samples` at the latest; 0: never */
 	int lobe_samples;  /* of a finite lobe; 0 = one ray in the mirror or straight-through
 	                      direction (the paper); VIEW_LOBE_ENOUGH: as many as it takes */
