@@ -259,20 +259,35 @@ static void add_rays(struct gather_worker *w, const double x[3], double frame[3]
 	view_gather_follow(w->tails, w->t, 0, sum);
 }
 
-/* Irradiance from the sums of parts of `rays` rays each, and its standard error. 1 if that
- * is small enough. */
-static int settled(double part[REPLICATES][BANDS_MAX], int bands, double rays, double relative,
-                   const double *scale, double *h, double *error)
+/* Irradiance from the sums of parts of `rays` rays each, and its standard error. */
+static void measure(double part[REPLICATES][BANDS_MAX], int bands, double rays, double *h,
+                    double *error)
 {
-	int good = 1;
-
 	for (int b = 0; b < bands; b++) {
 		struct replicates r = replicates_of(&part[0][b], BANDS_MAX, REPLICATES);
 		h[b] = PI * r.mean / rays;
 		error[b] = PI * together * replicates_error(r, REPLICATES) / rays;
-		good &= error[b] <= relative * scale[b];
 	}
-	return good;
+}
+
+/* Rays of a part for an error of `relative` times scale[bands], by a pilot: rays that are kept must
+ * not decide it, for where all have missed what is small they would be thought enough. */
+static uint32_t enough(struct gather_worker *w, const double x[3], double frame[3][3],
+                       uint64_t seed, double relative, const double *scale)
+{
+	double part[REPLICATES][BANDS_MAX] = { { 0 } }, h[BANDS_MAX], error[BANDS_MAX], most = 0;
+	uint32_t each = FIRST;
+
+	for (uint32_t p = 0; p < REPLICATES; p++)
+		add_rays(w, x, frame, rng_mix(~seed), p * FIRST, FIRST, part[p]);
+	add_closes(w);
+	measure(part, w->t->v->m->bands, FIRST, h, error);
+	for (int b = 0; b < w->t->v->m->bands; b++)
+		if (error[b] > 0)
+			most = fmax(most, error[b] / (relative * scale[b]));
+	while (each < MOST && each < FIRST * most * most)
+		each *= 2;
+	return each;
 }
 
 void view_gather_point(struct gather_worker *w, const double x[3], const double n[3], uint64_t seed,
@@ -280,26 +295,18 @@ void view_gather_point(struct gather_worker *w, const double x[3], const double 
 {
 	double part[REPLICATES][BANDS_MAX] = { { 0 } }, frame[3][3];
 	int bands = w->t->v->m->bands;
-	uint32_t each = relative > 0 ? FIRST : (uint32_t)(rays + REPLICATES - 1) / REPLICATES;
 
-	memset(w->blur, 0, sizeof w->blur);
-	w->blurs = 0;
 	memcpy(w->normal, n, sizeof w->normal);
 	v3_frame(n, frame[0], frame[1]);
 	memcpy(frame[2], n, sizeof frame[2]);
+	uint32_t each = relative > 0 ? enough(w, x, frame, seed, relative, scale)
+	                             : (uint32_t)(rays + REPLICATES - 1) / REPLICATES;
+	memset(w->blur, 0, sizeof w->blur);
+	w->blurs = 0;
 	for (uint32_t p = 0; p < REPLICATES; p++)
 		add_rays(w, x, frame, seed, p * each, each, part[p]);
 	add_closes(w);
-	while (!settled(part, bands, each, relative, scale, to->h, to->error) && relative > 0 &&
-	       each < MOST) {
-		/* As many again: the parts so far are half as many, twice as long. */
-		each *= 2;
-		for (int b = 0; b < bands; b++)
-			replicates_halve(&part[0][b], BANDS_MAX);
-		for (uint32_t p = REPLICATES / 2; p < REPLICATES; p++)
-			add_rays(w, x, frame, seed, p * each, each, part[p]);
-		add_closes(w);
-	}
+	measure(part, bands, each, to->h, to->error);
 	for (int b = 0; b < bands; b++)
 		to->common[b] = PI * sqrt(w->blur[b] / w->blurs);
 }
