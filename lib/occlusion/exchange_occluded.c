@@ -11,29 +11,38 @@
 
 struct cell {
 	struct facet_room shape;
-	uint64_t occluders;            /* that may hide something from it */
-	uint32_t edges, bends;        /* bits of those that may cross it */
-	double most;                  /* about its exchange area if nothing were hidden */
-	double value, error;
-	int bright;                   /* no occluder occluded anything from its points */
+	uint64_t occluders;           /* that may hide something from it */
+	uint32_t edges;               /* bits of those that may cross it */
+	int dark;                     /* how many times in a row all its points saw nothing */
+	const struct plane *limit;    /* of a shadow that ends in it: where to cut it first; or NULL */
+	/* Exchange areas, m^2. */
+	double whole;                 /* about that of the cell if nothing were hidden */
+	double value;
+	double uneven;                /* how far what its points see is from linear */
+	double unseen;                /* what shadows that end in it may hide between its points */
+	double error;
 };
 
-/* How little a cell is trusted, as fractions of `most`. Guesses; tests/bench/stress_exchange.c,
- * which compares exchange areas of random scenes at two tolerances and by brute force, tells
- * whether stated errors hold. */
-static const double uncompared_error = .1;      /* before it is compared with its quarters */
-static const double edge_error = .1;            /* where its points may all have missed the edge of
-                                                   a shadow (.02 at first: too little) */
-static const double missed_edge_error = 1e-4;   /* where its corners have, too, and known edges
-                                                   end it */
-static const double guessed_error_least = 1e-3; /* where only its centre has told: a difference of
-                                                   two rules may be 0 by accident */
+/* How errors of cells are estimated. Samples never prove an integral: these were chosen so that of
+ * some thousand random pairs none is off by more than it states, and most by a hundredth
+ * (tests/bench/report shows the distribution for other pairs). Errors that are a fraction of
+ * `uneven` or `whole` shrink with the cell; none shrinks faster than the gains let it. */
+static const double first_least = .1;    /* of the whole, for the first cell */
+static const double cut_error = 1;       /* of `uneven`, for parts that a cut leaves */
+static const double uneven_least = .004; /* of `uneven`, however well parts agree with the whole */
+static const double cut_gain = 4;        /* how many times a cut may lessen the error, */
+static const double quarter_gain = 12;   /* and quartering it: this, and more by as much as parts */
+static const double smooth_gain = 128;   /* agree better than `smooth`, up to this. Ideal is 64. */
+static const double smooth = .003;       /* |whole - parts| / `uneven` of smooth integrands, */
+static const double rough = .03;         /* and of such as have kinks: the difference is the error */
+static const double smooth_error = .125; /* of that difference where the integrand is smooth */
+static const double limit_error = .15;   /* of what an occluder hides in a cell where its shadow ends, */
+static const double missed_part = .3;    /* all of it if the shadow takes less than this of the cell */
+static const double dark_error = .05;    /* of the whole, where points see nothing without proof; */
+static const double dark_gain = 4;       /* a cell within such a one so many times less */
 
-/* How many times smaller a quarter's error may be than that of the whole, at most: where a
- * shadow's edge is not known, the sum over quarters may agree by accident. A smooth one's is 64
- * times smaller: a rule of fourth order, a quarter of the area. A guess beyond that (4096 at
- * first: too much); see above. */
-static const double quarters_gain_most = 256;
+/* Of the total: errors of many cells partly cancel, those of like ones need not. */
+static const double random_part = 2, common_part = .05;
 
 /* A count: of the facet seen, to prove that several occluders hide it. 32 parts; a guess. */
 enum { HALVINGS = 5 };
@@ -48,15 +57,17 @@ struct integral {
 	struct unoccluded *unoccluded;
 	const struct facet *f, *g;
 	double near;
-	struct shadows shadows;
-	double settled;               /* of cells that are exact */
-	int cut;                      /* cells are to end at the edges of shadows */
+	struct shadows *shadows;
+	double value;                 /* of all cells, and what is exact */
+	double error, squares;        /* sums over the cells in the heap */
+	double stuck;                 /* errors of cells too small to divide */
 	struct err *e;
 };
 
 void occ_occluded_free(struct occluded *o)
 {
 	free(o->cell.data);
+	free(o->heap.data);
 	*o = (struct occluded){ 0 };
 }
 
@@ -78,57 +89,180 @@ static const struct facet *shape_of(struct cell *c)
 /* Parts have no points kept. */
 static const struct unoccluded_points none = { NULL, NULL };
 
-/* Settles a cell that sees all of g or nothing: 1. Otherwise narrows its occluders down. */
-static int settle(struct integral *in, struct cell *c, const struct facet *f)
+static double visible_from(const struct integral *in, uint64_t occluders, const double x[3])
 {
-	int hidden;
-
-	c->occluders = occ_shadow_on(in->o->visible.occluder, &in->shadows, c->occluders, f, in->g,
-	                             in->near, &hidden);
-	if (hidden)
-		return 1;
-	if (!c->occluders)
-		in->settled += geo_unoccluded_exchange(in->unoccluded, f, none, in->g, none);
-	return !c->occluders;
+	return occ_visible_exchange(&in->o->visible, x, in->f->normal, in->g, occluders, in->e);
 }
 
-/* The form factor from a point of a cell to what it sees of g. */
-static double visible_from(const struct integral *in, const struct cell *c, const double x[3])
+/* How far what Radon's seven points of a triangle see is from linear. */
+static double uneven_triangle(const double v[7])
 {
-	return occ_visible_exchange(&in->o->visible, x, in->f->normal, in->g, c->occluders, in->e);
+	/* Rings stand at these parts of the way from the centre to the corners (or beyond). */
+	const double at[2] = { (1 + sqrt(15)) / 7, (1 - sqrt(15)) / 7 };
+	double mean[2] = { (v[0] + v[1] + v[2]) / 3, (v[3] + v[4] + v[5]) / 3 };
+	double off = fmax(fabs(mean[0] - v[6]), fabs(mean[1] - v[6]));
+
+	for (int i = 0; i < 3; i++)
+		off = fmax(off, fabs(at[1] / at[0] * (v[i] - mean[0]) - (v[3 + i] - mean[1])));
+	return off;
+}
+
+/* The same of a quadrilateral. */
+static double uneven_square(const double v[7])
+{
+	const double steeper = sqrt(1. / 3) / sqrt(14. / 15);
+	double off = fmax(fabs((v[1] + v[2]) / 2 - v[0]),
+	                  fabs((v[3] + v[4] + v[5] + v[6]) / 4 - v[0]));
+
+	off = fmax(off, fabs((v[3] - v[4] - v[5] + v[6]) / 4));
+	return fmax(off, fabs((v[3] - v[4] + v[5] - v[6]) / 4 - (v[1] - v[2]) / 2 * steeper));
 }
 
 static void measure(const struct integral *in, struct cell *c, const struct facet *f)
 {
-	double x[4][4 * FACET_CORNERS];
+	double x[4][4 * FACET_CORNERS], v[7];
 	struct cubature p = { 0, x[0], x[1], x[2], x[3] };
 
-	geo_cubature_fill(f, 0, &p);
-	c->value = 0;
-	in->o->visible.occluded = 0;
-	for (int i = 0; i < p.n; i++) {
-		double at[3] = { p.x[i], p.y[i], p.z[i] };
-		if (p.w[i] > 0)
-			c->value += p.w[i] * visible_from(in, c, at);
+	geo_cubature_fill(f, 1, &p);
+	c->value = c->uneven = 0;
+	for (int i = 0; i < p.n; i += 8) {
+		double area = 0, sum = 0;
+		for (int k = 0; k < 7; k++) {
+			double at[3] = { p.x[i + k], p.y[i + k], p.z[i + k] };
+			v[k] = visible_from(in, c->occluders, at);
+			sum += p.w[i + k] * v[k];
+			area += p.w[i + k];
+		}
+		int triangle = f->n % 2 && i + 8 == p.n;
+		c->value += sum;
+		c->uneven += area * (triangle ? uneven_triangle(v) : uneven_square(v));
 	}
-	c->bright = !in->o->visible.occluded;
 }
+
+static double hidden_by(const struct integral *in, int occluder, const double x[3])
+{
+	return geo_contour_point(x, in->f->normal, in->g->n, in->g->v) - visible_from(in, (uint64_t)1 << occluder, x);
+}
+
+/* What occluders whose shadows end in a cell may hide there that its points do not see. */
+static void look_at_limits(const struct integral *in, struct cell *c, const struct facet *f,
+                           uint64_t crossed)
+{
+	double worst = 0;
+
+	c->unseen = 0;
+	c->limit = NULL;
+	for (; crossed; crossed &= crossed - 1) {
+		int k = __builtin_ctzll(crossed);
+		struct facet_room part;
+		const struct plane *limit;
+		if (!occ_shadow_part(in->shadows, k, f, in->near, &part, &limit)) {
+			c->occluders &= ~((uint64_t)1 << k);
+			continue;
+		}
+		double hidden = part.f.area * hidden_by(in, k, part.f.centre);
+		double doubt = hidden * (part.f.area < missed_part * f->area ? 1 : limit_error);
+		c->unseen += doubt;
+		if (doubt > worst) {
+			worst = doubt;
+			c->limit = limit;
+		}
+	}
+}
+
+/* Is it sure that occluders, one or together, hide all from a cell? */
+static int dark(const struct integral *in, const struct cell *c, const struct facet *f)
+{
+	return occ_occluders_hide(in->o->visible.occluder, c->occluders, f, in->g, in->near, HALVINGS);
+}
+
+/* Measures a cell: 1, or 0 if it is exact and so settled. */
+static int take(struct integral *in, struct cell *c, const struct facet *f)
+{
+	uint64_t crossed;
+
+	c->occluders = occ_shadow_on(in->shadows, c->occluders, f, in->near, &crossed);
+	if (crossed)
+		look_at_limits(in, c, f, crossed);
+	if (!c->occluders) {
+		in->value += geo_unoccluded_exchange(in->unoccluded, f, none, in->g, none);
+		return 0;
+	}
+	if (visible_from(in, c->occluders, f->centre) <= 0 && dark(in, c, f))
+		return 0;
+	measure(in, c, f);
+	c->dark = c->value <= 0 ? c->dark + 1 : 0;
+	return 1;
+}
+
+/* ---- the worst cell: a heap ---- */
+
+struct rank {
+	double error;
+	size_t cell;
+};
+
+static int before(const struct rank *a, const struct rank *b)
+{
+	return a->error > b->error || (a->error == b->error && a->cell < b->cell);
+}
+
+static int put_cell(struct integral *in, const struct cell *c, size_t at)
+{
+	struct array *cells = &in->o->cell, *heap = &in->o->heap;
+
+	if (at == cells->n) {
+		if (mem_append(cells, c, 1, sizeof *c, in->e))
+			return -1;
+	} else {
+		((struct cell *)cells->data)[at] = *c;
+	}
+	if (mem_reserve(heap, 1, sizeof(struct rank), in->e))
+		return -1;
+	struct rank *h = heap->data, new = { c->error, at };
+	size_t i = heap->n++;
+	for (; i && before(&new, &h[(i - 1) / 2]); i = (i - 1) / 2)
+		h[i] = h[(i - 1) / 2];
+	h[i] = new;
+	in->value += c->value;
+	in->error += c->error;
+	in->squares += c->error * c->error;
+	return 0;
+}
+
+static size_t take_worst(struct integral *in)
+{
+	struct array *heap = &in->o->heap;
+	struct rank *h = heap->data, first = h[0], last = h[--heap->n];
+	size_t i = 0, k;
+
+	for (; (k = 2 * i + 1) < heap->n; i = k) {
+		k += k + 1 < heap->n && before(&h[k + 1], &h[k]);
+		if (!before(&h[k], &last))
+			break;
+		h[i] = h[k];
+	}
+	h[i] = last;
+	return first.cell;
+}
+
+/* ---- refinement ---- */
 
 /* The cut that halves a cell best, of those with an occluder that matters to it; forgets
  * cuts that do not cross it. NULL if none is left. */
 static const struct plane *best_cut(const struct integral *in, const struct shadow_cuts *s,
-                                    uint32_t *bits, const struct cell *c, const struct facet *f)
+                                    struct cell *c, const struct facet *f)
 {
 	const struct plane *found = NULL;
 	double best = 0;
 
 	for (int i = 0; i < s->n; i++) {
 		double lowest, highest;
-		if (!(*bits >> i & 1))
+		if (!(c->edges >> i & 1))
 			continue;
 		geo_facet_heights(f, s->cut[i].normal, s->cut[i].offset, &lowest, &highest);
 		if (lowest >= -in->near || highest <= in->near || !(s->of[i] & c->occluders)) {
-			*bits &= ~((uint32_t)1 << i);
+			c->edges &= ~((uint32_t)1 << i);
 		} else if (fmin(-lowest, highest) > best * (highest - lowest)) {
 			best = fmin(-lowest, highest) / (highest - lowest);
 			found = &s->cut[i];
@@ -137,135 +271,125 @@ static const struct plane *best_cut(const struct integral *in, const struct shad
 	return found;
 }
 
-/* The error of a cell's points where no edge is known to cross it: that of its centre
- * alone is of second order, theirs of fourth. */
-static double guess_error(const struct integral *in, const struct cell *c, const struct facet *f)
-{
-	double one = f->area * visible_from(in, c, f->centre);
-	double off = c->value - one, guess = 4 * off * off / c->value;
-
-	return fmin(uncompared_error, fmax(guessed_error_least, guess / c->most)) * c->most;
-}
-
-/* What the least error is that a measured cell can claim: more where edges of shadows are
- * known to cross it, where a corner sees what its points did not, or where it has not been
- * compared with its quarters. */
-static double doubt(const struct integral *in, struct cell *c, const struct facet *f, int compared)
-{
-	int dark = c->value == 0;
-	double off = 0;
-
-	if (!in->cut || best_cut(in, &in->shadows.edges, &c->edges, c, f))
-		return edge_error * c->most;
-	if (!(dark || c->bright))
-		return compared ? 0 : guess_error(in, c, f);
-	for (int k = 0; k < f->n; k++) {
-		const double *v = &f->v[3 * k];
-		double s = visible_from(in, c, v);
-		double all = geo_contour_point(v, in->f->normal, in->g->n, in->g->v);
-		if (all > 0)
-			off = fmax(off, fmin(1, dark ? s / all : 1 - s / all));
-	}
-	return c->most * (missed_edge_error + uncompared_error * off);
-}
-
 /* The parts that a cell is refined into: on both sides of the edge of a shadow, or
  * quarters. Returns their number. */
 static int divide(const struct integral *in, struct cell *c, struct facet_room part[4])
 {
 	const struct facet *f = shape_of(c);
-	const struct plane *cut = NULL;
+	const struct plane *cut = c->limit && c->unseen >= c->error / 2 ?
+	                                  c->limit :
+	                                  best_cut(in, &in->shadows->edges, c, f);
 
-	if (in->cut)
-		cut = best_cut(in, &in->shadows.edges, &c->edges, c, f);
-	if (in->cut && !cut)
-		cut = best_cut(in, &in->shadows.bends, &c->bends, c, f);
-	if (!cut)
-		return geo_facet_quarter(f, part) ? 4 : 0;
-	return geo_facet_split(f, cut->normal, cut->offset, part) ? 2 : 0;
+	if (cut && geo_facet_split(f, cut->normal, cut->offset, part))
+		return 2;
+	return geo_facet_quarter(f, part) ? 4 : 0;
 }
 
-/* Is it sure that the occluders together hide all from a cell that saw nothing? */
-static int dark(const struct integral *in, const struct cell *c, const struct facet *f)
+/* The error of all parts of a cell. off: by how much its value changed; quarters: or cut. */
+static double error_of_parts(const struct cell *c, double uneven, double off, int quarters)
 {
-	return c->value == 0 && occ_occluders_hide(in->o->visible.occluder, c->occluders, f, in->g,
-	                                           in->near, HALVINGS);
+	double change = uneven > 0 ? off / uneven : off > 0 ? 1 : 0;
+	double gain = cut_gain, error = cut_error * uneven;
+
+	if (quarters) {
+		gain = fmin(smooth_gain, quarter_gain * fmax(1, smooth / fmax(change, 1e-9)));
+		error = off * fmin(1, fmax(smooth_error, change / rough));
+	}
+	return fmax(error, fmax(uneven_least * uneven, c->error / gain));
 }
 
-/* Replaces a cell by its parts. */
-static int refine(struct integral *in, size_t i)
+/* Gives parts their errors: by how uneven each is, a bit by its area. */
+static void judge(const struct cell *c, struct cell *part, int n, int quarters, double off)
 {
-	struct array *cells = &in->o->cell;
-	struct cell c = ((struct cell *)cells->data)[i], part[4];
+	double uneven = 0, area = 0;
+
+	for (int k = 0; k < n; k++) {
+		uneven += part[k].uneven;
+		area += part[k].shape.f.area;
+	}
+	double all = error_of_parts(c, uneven, off, quarters);
+	for (int k = 0; k < n; k++) {
+		double share = part[k].shape.f.area / area;
+		if (uneven > 0)
+			share = (part[k].uneven / uneven + share / 10) / 1.1;
+		part[k].error = fmax(all * share, part[k].unseen);
+		if (part[k].dark)
+			part[k].error = fmax(part[k].error, dark_error * part[k].whole *
+			                                            pow(dark_gain, 1 - part[k].dark));
+	}
+}
+
+/* Replaces the worst cell by its parts. */
+static int refine(struct integral *in)
+{
+	size_t at = take_worst(in);
+	struct cell c = ((struct cell *)in->o->cell.data)[at], part[4];
 	struct facet_room room[4];
-	double before = in->settled, area = c.shape.f.area, sum = 0;
 	int n = divide(in, &c, room), left = 0;
 
+	in->error -= c.error;
+	in->squares -= c.error * c.error;
 	if (!n) { /* too small to divide */
-		((struct cell *)cells->data)[i].error = 0;
+		in->stuck += c.error;
 		return 0;
 	}
-	((struct cell *)cells->data)[i] = ((struct cell *)cells->data)[--cells->n];
+	double before = in->value, area = c.shape.f.area, sum = 0;
 	for (int k = 0; k < n; k++) {
-		const struct facet *f = &room[k].f;
 		part[left] = (struct cell){ .occluders = c.occluders, .edges = c.edges,
-		                            .bends = c.bends, .most = c.most * f->area / area };
-		set_shape(&part[left], f);
-		if (settle(in, &part[left], f))
+		                            .whole = c.whole * room[k].f.area / area,
+		                            .dark = c.dark };
+		set_shape(&part[left], &room[k].f);
+		if (!take(in, &part[left], shape_of(&part[left])))
 			continue;
-		measure(in, &part[left], f);
 		sum += part[left].value;
-		left += !dark(in, &part[left], f);
+		left++;
 	}
-	/* A rule of fourth order leaves a fifteenth of the difference where what is seen is
-	 * smooth, a third across the edge of a shadow; more where edges of several occluders
-	 * cross one another before g, which no cut follows. */
-	int several = (c.occluders & (c.occluders - 1)) != 0;
-	double off = fabs(sum + in->settled - before - c.value) / ((several ? 1 : 3) * left);
-	for (int k = 0; k < left; k++) {
-		double least = n == 4 ? c.error / quarters_gain_most : 0;
-		part[k].error =
-		    fmax(fmax(off, least), doubt(in, &part[k], shape_of(&part[k]), n == 4));
-	}
-	return mem_append(cells, part, (size_t)left, sizeof *part, in->e);
+	double off = fabs(sum + in->value - before - c.value);
+	in->value -= c.value;
+	judge(&c, part, left, n == 4, off);
+	for (int k = 0; k < left; k++)
+		if (put_cell(in, &part[k], k ? in->o->cell.n : at))
+			return -1;
+	return 0;
 }
 
-static int put_whole(struct integral *in, uint64_t occluders, double most)
+static int put_whole(struct integral *in, uint64_t occluders, double whole)
 {
-	struct cell c = { .occluders = occluders, .most = most,
-	                  .edges = UINT32_MAX, .bends = UINT32_MAX };
+	struct cell c = { .occluders = occluders, .whole = whole, .edges = UINT32_MAX };
 
 	set_shape(&c, in->f);
-	if (settle(in, &c, in->f))
+	if (!take(in, &c, shape_of(&c)))
 		return 0;
-	measure(in, &c, in->f);
-	c.error = uncompared_error * c.most;
-	return mem_append(&in->o->cell, &c, 1, sizeof c, in->e);
+	/* It is between nothing and the whole for certain. */
+	c.error = fmin(fmax(fmax(c.uneven, c.unseen), first_least * whole),
+	               fmax(c.value, whole - c.value));
+	return put_cell(in, &c, 0);
 }
 
 /* ---- the integral ---- */
 
-static double integrate(struct integral *in, double tolerance, int most, double *error)
+static double stated(const struct integral *in)
+{
+	return in->stuck + fmin(in->error, common_part * in->error + random_part * sqrt(fmax(0, in->squares)));
+}
+
+static int integrate(struct integral *in, double tolerance, int most)
 {
 	struct occluded *o = in->o;
 	double stop = o->visible.evaluations + most;
 
-	for (;;) {
-		const struct cell *c = o->cell.data;
-		double sum = in->settled, off = 0;
-		size_t worst = 0;
-		for (size_t i = 0; i < o->cell.n; i++) {
-			sum += c[i].value;
-			off += c[i].error;
-			if (c[i].error > c[worst].error)
-				worst = i;
-		}
-		*error = off;
-		if (!(off > tolerance) || o->visible.evaluations >= stop)
-			return sum;
-		if (refine(in, worst))
-			return NAN;
+	while (stated(in) > tolerance && o->heap.n && o->visible.evaluations < stop)
+		if (refine(in))
+			return -1;
+	/* Sums that were added to and taken from: once more, without their rounding. */
+	const struct rank *h = o->heap.data;
+	in->error = in->squares = 0;
+	for (size_t i = 0; i < o->heap.n; i++) {
+		in->error += h[i].error;
+		in->squares += h[i].error * h[i].error;
 	}
+	in->error = stated(in);
+	return 0;
 }
 
 static void make_occluders(struct occluded *o, const struct shaft *l, const struct facet *g)
@@ -294,7 +418,7 @@ double occ_occluded_exchange(struct occluded *o, struct unoccluded *unoccluded,
                              struct err *e)
 {
 	struct integral in = {
-		.o = o, .unoccluded = unoccluded, .f = l->a, .g = l->b, .near = l->set->near, .e = e
+		.o = o, .unoccluded = unoccluded, .f = l->a, .g = l->b, .near = l->set->near, .e = e, .shadows = &o->shadows
 	};
 
 	make_occluders(o, l, l->b);
@@ -304,17 +428,13 @@ double occ_occluded_exchange(struct occluded *o, struct unoccluded *unoccluded,
 		make_occluders(o, l, l->a);
 	}
 	occ_visible_begin(&o->visible, o->occluders, in.near);
-	o->cell.n = 0;
+	o->cell.n = o->heap.n = 0;
 	uint64_t all = o->occluders ? UINT64_MAX >> (64 - o->occluders) : 0;
-	/* Cutting pays where more is asked for than cells across shadows' edges can tell. */
 	double whole = geo_unoccluded_exchange(unoccluded, in.f, none, in.g, none);
-	in.cut = tolerance < 2 * edge_error * whole; /* 2: a guess */
-	if (in.cut)
-		occ_shadow_edges(o->visible.occluder, o->occluders, in.f, in.g, in.near,
-		                 &in.shadows);
-	if (put_whole(&in, all & ~in.shadows.idle, whole))
+	occ_shadow_edges(o->visible.occluder, o->occluders, in.f, in.g, in.near, in.shadows);
+	if (put_whole(&in, all & ~in.shadows->idle, whole) || integrate(&in, tolerance, most))
 		return NAN;
-	double visible = integrate(&in, tolerance, most, error);
+	*error = in.error;
 	/* Rounding where occluders touch a facet's edges must not carry light through walls. */
-	return visible < rounding * whole ? 0 : visible;
+	return in.value < rounding * whole ? 0 : in.value;
 }

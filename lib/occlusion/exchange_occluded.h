@@ -1,4 +1,5 @@
-/* Exchange areas of partly hidden facets. One of them is cut along the edges of what the
+/* Exchange areas of partly hidden facets. One of them is cut where shadows end, and along edges
+ * of what the
  * occluders' shadows can be; cells that see all of the other facet, or nothing, are exact;
  * over the others what their points see exactly is integrated by adaptive cubature. */
 #ifndef TWOPASS_EXCHANGE_OCCLUDED_H
@@ -6,13 +7,15 @@
 
 #include "lib/base/mem.h"
 #include "lib/geometry/exchange_unoccluded.h"
+#include "lib/occlusion/shadow_edges.h"
 #include "lib/occlusion/visible_region.h"
 
 /* One thread's scratch space; begin with {0}, release with occ_occluded_free. */
 struct occluded {
 	struct visible_point visible;
+	struct shadows shadows;
 	int occluders;
-	struct array cell;              /* struct cell */
+	struct array cell, heap;        /* struct cell; struct rank of them */
 };
 
 void occ_occluded_free(struct occluded *o);

@@ -5,7 +5,7 @@
 #include "lib/base/vec.h"
 #include "lib/occlusion/occluder_polygons.h"
 
-/* Up to how many occluders it pays to look for bends, and where the shadows of two meet, a count:
+/* Up to how many occluders it pays to look for where the shadows of two meet, a count:
  * the cells between many are small anyway. A guess. */
 enum { FEW = 3 };
 
@@ -20,7 +20,6 @@ static const double same_direction = 5e-13;
 struct cuts {
 	const struct facet *f, *g;
 	double near;
-	int few;                      /* occluders: it pays to look for more than edges */
 	struct shadows *s;
 };
 
@@ -71,19 +70,17 @@ static void consider(struct cuts *c, const struct occluder *b, int number, struc
 {
 	struct shadows *s = c->s;
 	int of_g = side_of(p, c->g->v, c->g->n, c->near);
-	int of_f = of_g || kink || c->few ? side_of(p, c->f->v, c->f->n, c->near) : 1;
+	int of_f = of_g || kink ? side_of(p, c->f->v, c->f->n, c->near) : 1;
 
 	if (of_f && of_f != of_g)
 		return;
-	int of_b = of_g || c->few ? occluder_side(b, p, c->near) : 0;
+	int of_b = of_g ? occluder_side(b, p, c->near) : 0;
 	if (of_f) {
 		s->idle |= (uint64_t)(of_b == -of_f) << number;
 		return;
 	}
 	if (kink || (of_g && of_b))
 		add(c, &s->edges, p, (uint64_t)1 << number);
-	else if (c->few && (of_g || of_b))
-		add(c, &s->bends, p, (uint64_t)1 << number);
 	if (!of_g || of_b != -of_g || s->limits == SHADOW_LIMITS)
 		return;
 	if (of_b < 0)
@@ -190,8 +187,7 @@ static void first_and_last(const struct cuts *c, const struct occluder *b, int e
 	}
 }
 
-/* Planes through an edge of g and corners of an occluder: those that have it on one side, or
- * all. */
+/* Planes through an edge of g and corners of an occluder that have it on one side. */
 static void corner_cuts(struct cuts *c, const struct occluder *b, int number, int edge,
                         const double along[3])
 {
@@ -199,12 +195,6 @@ static void corner_cuts(struct cuts *c, const struct occluder *b, int number, in
 	int found[2];
 	struct plane p;
 
-	if (c->few) {
-		for (int i = 0; i < b->corners && !(c->s->idle >> number & 1); i++)
-			if (plane_through(from, along, b->corner[i], c->near, &p))
-				consider(c, b, number, &p, 0);
-		return;
-	}
 	first_and_last(c, b, edge, along, found);
 	for (int i = 0; i < 2 && !(c->s->idle >> number & 1); i++)
 		if (plane_through(from, along, b->corner[found[i]], c->near, &p))
@@ -249,8 +239,8 @@ static void gap_cuts(struct cuts *c, const struct occluder *a, const struct occl
 	}
 }
 
-/* Planes through an edge of one occluder and a corner of another with each on one side:
- * their shadows meet there, or part. */
+/* Planes through an edge of one occluder and a corner of another with one on each side:
+ * their shadows meet there. */
 static void meeting_cuts(struct cuts *c, const struct occluder *a, const struct occluder *b,
                          uint64_t of)
 {
@@ -266,8 +256,8 @@ static void meeting_cuts(struct cuts *c, const struct occluder *a, const struct 
 				continue;
 			int side = occluder_side(a, &p, c->near);
 			side *= side ? occluder_side(b, &p, c->near) : 0;
-			if (side)
-				add(c, side < 0 ? &c->s->edges : &c->s->bends, &p, of);
+			if (side < 0)
+				add(c, &c->s->edges, &p, of);
 		}
 	}
 }
@@ -275,9 +265,9 @@ static void meeting_cuts(struct cuts *c, const struct occluder *a, const struct 
 void occ_shadow_edges(const struct occluder *b, int occluders, const struct facet *f,
                       const struct facet *g, double near, struct shadows *s)
 {
-	struct cuts c = { f, g, near, occluders <= FEW, s };
+	struct cuts c = { f, g, near, s };
 
-	s->edges.n = s->bends.n = s->limits = 0;
+	s->edges.n = s->limits = 0;
 	s->idle = 0;
 	for (int i = 0; i < occluders; i++) {
 		find_idle(&c, &b[i], i);
@@ -286,7 +276,7 @@ void occ_shadow_edges(const struct occluder *b, int occluders, const struct face
 	for (int i = 0; i < occluders && s->edges.n < SHADOW_CUTS; i++)
 		for (int j = 0; j < i; j++)
 			gap_cuts(&c, &b[i], &b[j], (uint64_t)1 << i | (uint64_t)1 << j);
-	for (int i = 0; c.few && i < occluders; i++)
+	for (int i = 0; occluders <= FEW && i < occluders; i++)
 		for (int j = 0; j < occluders; j++)
 			if (j != i)
 				meeting_cuts(&c, &b[i], &b[j], (uint64_t)1 << i | (uint64_t)1 << j);
@@ -294,38 +284,48 @@ void occ_shadow_edges(const struct occluder *b, int occluders, const struct face
 
 /* ---- cells ---- */
 
-/* Is the occluder beyond one of the planes that hold both facets behind them? */
-static int outside(const struct occluder *b, const struct plane *shaft, int planes, double near)
+uint64_t occ_shadow_on(const struct shadows *s, uint64_t from, const struct facet *cell,
+                       double near, uint64_t *crossed)
 {
-	for (int p = 0; p < planes; p++) {
-		int i = 0;
-		while (i < b->corners && occ_plane_height(&shaft[p], b->corner[i]) >= -near)
-			i++;
-		if (i == b->corners)
-			return 1;
-	}
-	return 0;
-}
-
-uint64_t occ_shadow_on(const struct occluder *b, const struct shadows *s, uint64_t from,
-                       const struct facet *cell, const struct facet *g, double near, int *hidden)
-{
-	struct plane shaft[SHAFT_PLANES];
 	uint64_t left = from;
 
-	*hidden = 0;
-	for (int i = 0; i < s->limits; i++)
-		if (left >> s->occluder[i] & 1 &&
-		    side_of(&s->limit[i], cell->v, cell->n, near) < 0)
-			left &= ~((uint64_t)1 << s->occluder[i]);
-	/* Where the limits of shadows are known they say as much. */
-	int planes = left && !s->limits ? occ_shaft_planes(cell, g, near, shaft) : 0;
-	for (uint64_t i = left; i; i &= i - 1) {
-		int k = __builtin_ctzll(i);
-		if (outside(&b[k], shaft, planes, near))
-			left &= ~((uint64_t)1 << k);
-		else if ((*hidden = occ_occluder_hides(&b[k], cell, g, near)))
-			return left;
+	*crossed = 0;
+	for (int i = 0; i < s->limits; i++) {
+		uint64_t bit = (uint64_t)1 << s->occluder[i];
+		if (!(left & bit))
+			continue;
+		double lowest, highest;
+		geo_facet_heights(cell, s->limit[i].normal, s->limit[i].offset, &lowest, &highest);
+		if (highest <= near)
+			left &= ~bit;
+		else if (lowest < -near)
+			*crossed |= bit;
 	}
+	*crossed &= left;
 	return left;
+}
+
+int occ_shadow_part(const struct shadows *s, int occluder, const struct facet *cell, double near,
+                    struct facet_room *part, const struct plane **limit)
+{
+	double best = 0;
+
+	*limit = NULL;
+	part->f = *cell;
+	for (int i = 0; i < s->limits; i++) {
+		const struct plane *p = &s->limit[i];
+		double lowest, highest;
+		if (s->occluder[i] != occluder)
+			continue;
+		geo_facet_heights(cell, p->normal, p->offset, &lowest, &highest);
+		if (lowest >= -near)
+			continue;
+		if (fmin(-lowest, highest) > best * (highest - lowest)) {
+			best = fmin(-lowest, highest) / (highest - lowest);
+			*limit = p;
+		}
+		if (!geo_facet_clip(&part->f, p->normal, p->offset, part))
+			return 0;
+	}
+	return 1;
 }

@@ -5,8 +5,8 @@
 #include "lib/occlusion/shaft.h"
 
 /* Counts. Cuts: as many as a cell has bits for them; further ones are left to the halving of cells.
- * Limits: further occluders are not ruled out early. 96 is a guess. */
-enum { SHADOW_CUTS = 32, SHADOW_LIMITS = 96 };
+ * Limits: 16 for each of the most occluders; a shadow seldom has more. */
+enum { SHADOW_CUTS = 32, SHADOW_LIMITS = 768 };
 
 struct shadow_cuts {
 	struct plane cut[SHADOW_CUTS];
@@ -15,9 +15,7 @@ struct shadow_cuts {
 };
 
 struct shadows {
-	/* Where shadows begin, end or fill differently; and where only how fast they grow
-	 * does: at a corner that the edge of a shadow passes in between. */
-	struct shadow_cuts edges, bends;
+	struct shadow_cuts edges;     /* where shadows begin, end or fill differently */
 	/* Planes with an occluder in front of them and all of g behind: what of f is behind
 	 * one sees g past that occluder. */
 	struct plane limit[SHADOW_LIMITS];
@@ -34,10 +32,15 @@ struct shadows {
 void occ_shadow_edges(const struct occluder *b, int occluders, const struct facet *f,
                       const struct facet *g, double near, struct shadows *s);
 
-/* What occluders do to the view from a convex cell in the plane of f to g: those of the set
- * bits of `from` that may hide something stay set; 0: nothing does. *hidden is set if one
- * of them hides all. */
-uint64_t occ_shadow_on(const struct occluder *b, const struct shadows *s, uint64_t from,
-                       const struct facet *cell, const struct facet *g, double near, int *hidden);
+/* The occluders, of those of the set bits of `from`, that may hide something of g from a convex
+ * cell in the plane of f. *crossed: bits of those whose shadow has a limit that crosses the
+ * cell; all points of the cell are in the shadows of the others. */
+uint64_t occ_shadow_on(const struct shadows *s, uint64_t from, const struct facet *cell,
+                       double near, uint64_t *crossed);
+
+/* The part of a cell that is in an occluder's shadow: 1, or 0 if none is. *limit: of those that
+ * cross the cell, the one that halves it best. */
+int occ_shadow_part(const struct shadows *s, int occluder, const struct facet *cell, double near,
+                    struct facet_room *part, const struct plane **limit);
 
 #endif
