@@ -43,6 +43,8 @@ static const struct option_spec options[] = {
 	  NUMBER(ff.target, 1e-12, 1) },
 	{ 0, "to", "WHAT", "elements or patches: what receives (default %s)",
 	  WORD(ff.to_patches, receivers) },
+	{ 0, "pair-errors", NULL, "formulas to patches: keep the error of each factor, too",
+	  FLAG(ff.pair_errors) },
 	{ 0, "close", NULL,
 	  "formulas to patches: change what is in doubt so that closed rows add up",
 	  FLAG(ff.close) },

@@ -8,7 +8,7 @@
 #include "lib/data/model.h"
 
 #define CACHE_VERSION "2"    /* of .mesh and .rad files */
-#define CACHE_FF_VERSION "4" /* of .ff files */
+#define CACHE_FF_VERSION "5" /* of .ff files */
 
 /* Strings are owned (malloc) and may be NULL. */
 struct cache_info {

@@ -106,6 +106,14 @@ static int map_arrays(const struct container *c, struct ff *f, uint32_t **part,
 	return 0;
 }
 
+/* Not made where it is absent: it is as large as the values. */
+static int map_value_errors(const struct container *c, struct ff *f, struct err *e)
+{
+	const struct field field = { &f->value_error, "value_error", DT_F32, 1, { f->entries } };
+
+	return file_container_find(c, field.name) ? file_fields_map(c, &field, 1, e) : 0;
+}
+
 static int get_receivers(const struct container *c, struct ff *f, struct err *e)
 {
 	const char *text = file_container_get_meta(c, "receivers");
@@ -124,7 +132,7 @@ static int map_ff(struct ff_file *o, struct err *e)
 	uint32_t *part = NULL, *most = NULL;
 
 	if (get_receivers(c, f, e) || get_counts(c, f, e) ||
-	    map_arrays(c, f, &part, &most, &o->made, e))
+	    map_arrays(c, f, &part, &most, &o->made, e) || map_value_errors(c, f, e))
 		return -1;
 	f->patch_begin = part[0];
 	f->patch_end = part[1];

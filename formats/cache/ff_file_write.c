@@ -14,7 +14,7 @@
 enum grown {
 	ROW_SCALE, ROW_BLOCK, BLOCK_START, BLOCK_COLUMN, BLOCK_ESCAPE, BLOCK_BLACK, BLOCK_LOST,
 	BLOCK_CUT, BLOCK_ARRIVAL, ROW_RESIDUAL, ROW_ERROR, ROW_SIDE, ROW_SAMPLES, BLOCK_CHAIN, COLUMN, VALUE,
-	ARRIVAL_TARGET, ARRIVAL_DIRECTION, LINK_TARGET, LINK_SOURCE, LINK_LAST, LINK_CHAIN, LINK_DIRECTION,
+	VALUE_ERROR, ARRIVAL_TARGET, ARRIVAL_DIRECTION, LINK_TARGET, LINK_SOURCE, LINK_LAST, LINK_CHAIN, LINK_DIRECTION,
 	LINK_ROW, ROW_KIND, GATHERED_RAYS, GATHERED_LOST, GATHERED_COUNT, GATHERED_LANDING, GATHERED_CHAIN, GROWN
 };
 
@@ -40,6 +40,7 @@ static const struct {
 	[BLOCK_CHAIN] = { "block_chain", DT_U32, FIELD_ZEROS, 1 },
 	[COLUMN] = { "column", DT_U32, FIELD_NEVER, 1 },
 	[VALUE] = { "value", DT_F32, FIELD_NEVER, 1 },
+	[VALUE_ERROR] = { "value_error", DT_F32, FIELD_ZEROS, 1 },
 	[ARRIVAL_TARGET] = { "arrival_target", DT_U32, FIELD_EMPTY, 1 },
 	[ARRIVAL_DIRECTION] = { "arrival_direction", DT_F32, FIELD_EMPTY, 3 },
 	[LINK_TARGET] = { "link_target", DT_U32, FIELD_EMPTY, 1 },
@@ -241,6 +242,22 @@ static int put_values(struct ff_writer *w, const struct ff *b, struct err *e)
 	              : put(w, VALUE, b->value, b->entries, sizeof *b->value, e);
 }
 
+/* Values of a batch without errors of their own have 0. */
+static int put_value_errors(struct ff_writer *w, const struct ff *b, struct err *e)
+{
+	const float zero = 0;
+
+	if (b->value_error)
+		return put(w, VALUE_ERROR, b->value_error, b->entries, sizeof *b->value_error, e);
+	if (w->array[VALUE_ERROR].handle < 0)
+		w->array[VALUE_ERROR].left_out += b->entries;
+	else
+		for (size_t i = 0; i < b->entries; i++)
+			if (put(w, VALUE_ERROR, &zero, 1, sizeof zero, e))
+				return -1;
+	return 0;
+}
+
 static int put_rows_and_blocks(struct ff_writer *w, const struct ff *b, struct err *e)
 {
 	const struct {
@@ -326,7 +343,7 @@ int file_ff_append(struct ff_writer *w, const struct ff *batch, struct err *e)
 		return err_set(e, "%s: more than 2^32 rows; compute it in parts",
 		               file_container_writer_path(w->container));
 	if (put_rows_and_blocks(w, batch, e) || put_columns(w, batch, e) ||
-	    put_values(w, batch, e) || put_link_rows(w, batch, e) ||
+	    put_values(w, batch, e) || put_value_errors(w, batch, e) || put_link_rows(w, batch, e) ||
 	    (!w->to_patches && put_gathered(w, &batch->gathered, e)))
 		return -1;
 	w->rows += batch->row.n;

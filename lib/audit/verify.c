@@ -186,6 +186,19 @@ static void compare_pairs(const struct pairs *p, struct reciprocity *r)
 	}
 }
 
+/* How far the sum of a row all by formula is from 1 before scaling, over the error it states and
+ * rounding: the largest. */
+static double worst_residual(const struct ff *f)
+{
+	double worst = 0;
+
+	for (size_t r = 0; r < f->row.n; r++)
+		if (f->row.samples[r] == 0)
+			worst = fmax(worst, fabs((double)f->row.residual[r]) /
+			                        ((double)f->row.error[r] + float_rounding));
+	return worst;
+}
+
 static double worst_closure(const struct ff *f, double *residual)
 {
 	double worst = 0;
@@ -215,6 +228,7 @@ int ff_verify(const struct ff *f, const struct ff_scene *s, struct verify *v, st
 		compare_pairs(&p, &r);
 		add(v, "rows: closure after scaling", "", closure, closure_limit);
 		add(v, "rows: residual before scaling", "", residual, (double)INFINITY);
+		add(v, "rows by formula: residual", "of the stated error", worst_residual(f), 1);
 	}
 	if (!failed && r.pairs > 0) {
 		add(v, "reciprocity: worst pair", "standard errors", r.worst, family_z(r.pairs));

@@ -127,6 +127,8 @@ struct ff {
 	uint16_t *column16;
 	float *value;             /* [entries]; one of value, value64 is NULL */
 	double *value64;
+	float *value_error;       /* [entries] estimated absolute error of a value, beyond what
+	                             it is rounded to; NULL: values have none of their own */
 
 	struct ff_arrivals arrival;
 	struct ff_links link;

@@ -146,6 +146,7 @@ static int check_rows(const struct ff *f, const struct ff_scene *s, struct err *
 	    err_check_starts("block_arrival", f->block.arrival, f->block.n, f->arrival.n, 0, e) ||
 	    err_check_below("block_chain", f->block.chain, f->block.n, f->chain.n, e) ||
 	    not_negative_f32("row_error", f->row.error, f->row.n, e) ||
+	    (f->value_error && not_negative_f32("value_error", f->value_error, f->entries, e)) ||
 	    not_negative("block_escape", f->block.escape, f->block.n, e) ||
 	    not_negative("block_black", f->block.black, f->block.n, e) ||
 	    not_negative("block_lost", f->block.lost, f->block.n, e) ||

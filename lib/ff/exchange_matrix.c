@@ -12,10 +12,13 @@
 /* BAND_BYTES: memory of the rows at work; a guess, small beside a machine's and large beside a
  * row. ROWS_AT_A_TIME: a batch of the file. TILE x TILE pairs of facets at a time stay in the
  * cache. Rays of a row's rest, and of a pair with a crowd between: guesses, whose noise the row's
- * error states. CERTAIN: stated errors beyond which a sum is surely off. `make bench-form-factors`
- * measures time and error of them all. */
+ * error states. `make bench-form-factors` measures time and error of them all.
+ * ROUNDS: closed rows that miss by more than they state are refined so often at most, each time
+ * with an error FINER times less, for so many times the evaluations, and rays to begin with.
+ * SURE_RAYS: rays that would have escaped, had they been cast so that 16 are expected to, tell that
+ * nothing does; PROOF_RAYS: the most that are cast for that. Guesses. */
 enum { BAND_BYTES = 192 << 20, ROWS_AT_A_TIME = 64, TILE = 32, REST_RAYS = 256,
-       CROWD_RAYS = 1024, CERTAIN = 4 };
+       CROWD_RAYS = 1024, ROUNDS = 3, FINER = 8, SURE_RAYS = 16, PROOF_RAYS = 1 << 20 };
 
 struct thread {
 	struct exchanger x;
@@ -43,6 +46,9 @@ struct matrix {
 	struct tally_rest *rest;      /* [rows] what of them no side receives */
 	uint8_t *closed;              /* [rows] what leaves the side arrives on sides */
 	struct array doubt;           /* struct doubt, by pair */
+	size_t *doubt_start;          /* [rows+1] of each row, in doubt_of_row */
+	uint32_t *doubt_of_row;       /* numbers of doubts */
+	float *value_error;           /* [2 patches] of the row that is put */
 };
 
 static double get(const struct matrix *m, size_t row, size_t j)
@@ -60,19 +66,28 @@ static void set(struct matrix *m, size_t row, size_t j, double x)
 
 /* ---- exchange areas ---- */
 
-/* Of two sides: the sum over their facets, in the same order whichever is asked for. */
-static double pair(struct matrix *m, struct thread *t, size_t a, size_t b)
+/* Of sides i < j: the sum over their facets. */
+static double exchange(struct matrix *m, struct thread *t, size_t i, size_t j, double *error)
 {
-	size_t i = a < b ? a : b, j = a < b ? b : a;
 	const uint32_t *start = m->facets.start;
 	uint32_t p = m->side[i], q = m->side[j];
-	double sum = 0, error = 0, off;
+	double sum = 0, off;
 
+	*error = 0;
 	for (uint32_t f = start[p]; f < start[p + 1]; f++)
 		for (uint32_t g = start[q]; g < start[q + 1]; g++) {
 			sum += occ_exchange(&t->x, &m->facets, f, &m->facets, g, &off, &t->e);
-			error += off;
+			*error += off;
 		}
+	return sum;
+}
+
+/* The same in the same order whichever is asked for; notes what is in doubt. */
+static double pair(struct matrix *m, struct thread *t, size_t a, size_t b)
+{
+	size_t i = a < b ? a : b, j = a < b ? b : a;
+	double error, sum = exchange(m, t, i, j, &error);
+
 	if (error > 2 * t->x.o.relative * sum) {
 		struct doubt d = { (uint32_t)i, (uint32_t)j, error };
 		mem_append(&t->doubt, &d, 1, sizeof d, &t->e);
@@ -161,12 +176,12 @@ static int is_curved(const struct matrix *m, size_t i)
 /* Gives what formulas leave of a row to where its rays go that formulas know nothing of:
  * curved patches (to a curved one, all), the outside, black backs. Returns how many rays
  * these are. */
-static double share_rest(struct matrix *m, size_t r, struct ff_rest *rest)
+static double share_rest(struct matrix *m, size_t r, uint32_t least, struct ff_rest *rest)
 {
 	struct ff_batch_row *row = &m->row[r];
 	size_t i = m->first + r;
 	uint32_t emits = m->job->emits[row->side];
-	uint32_t rays = m->curved ? m->job->o.rays * (emits ? m->job->o.emitter_gain : 1) : REST_RAYS;
+	uint32_t rays = m->curved ? m->job->o.rays * (emits ? m->job->o.emitter_gain : 1) : least;
 	int all = is_curved(m, i);
 	double lost, hits = 0, variance = 0;
 
@@ -205,14 +220,10 @@ static void judge(struct matrix *m, size_t r, struct ff_rest *rest)
 	row->residual = 1 - sum;
 	row->error = row->error / area + m->thread[0].x.o.relative * sum;
 	/* What the formulas leave at any rate is not worth rays. */
-	if (row->residual > m->thread[0].x.o.relative && share_rest(m, r, rest) > 0)
+	if (row->residual > m->thread[0].x.o.relative && share_rest(m, r, REST_RAYS, rest) > 0)
 		row->residual = 0;
-	else if (row->residual <= CERTAIN * row->error)
+	else
 		m->closed[r] = 1;
-	else {
-		m->rest[r].escape = row->residual;
-		row->residual = 0;
-	}
 }
 
 static void judge_rows(void *arg, size_t begin, size_t end, int thread)
@@ -221,6 +232,30 @@ static void judge_rows(void *arg, size_t begin, size_t end, int thread)
 
 	for (size_t r = begin; r < end; r++)
 		judge(m, r, &m->thread[thread].rest);
+}
+
+static int misses(const struct matrix *m, size_t r)
+{
+	return m->closed[r] && fabs(m->row[r].residual) > m->row[r].error;
+}
+
+/* Of rows that miss light by more than they state: it may leave by an opening too small for a few
+ * rays, which more of them find. Where so many would have found it, none is. */
+static void find_openings(void *arg, size_t begin, size_t end, int thread)
+{
+	struct matrix *m = arg;
+
+	for (size_t r = begin; r < end; r++) {
+		struct ff_batch_row *row = &m->row[r];
+		if (!misses(m, r) || row->residual < 0)
+			continue;
+		uint32_t rays = (uint32_t)fmin(PROOF_RAYS, SURE_RAYS / row->residual);
+		rays += (FF_REPLICATES - rays % FF_REPLICATES) % FF_REPLICATES;
+		if (share_rest(m, r, rays, &m->thread[thread].rest) <= 0)
+			continue;
+		m->closed[r] = 0;
+		row->residual = 0;
+	}
 }
 
 static void judge_all(struct matrix *m)
@@ -238,6 +273,80 @@ static void judge_all(struct matrix *m)
 			m->row[j].error += d[k].error;
 	}
 	par_for(m->rows, 16, m->job->o.threads, judge_rows, m, NULL);
+	par_for(m->rows, 16, m->job->o.threads, find_openings, m, NULL);
+}
+
+/* ---- closed rows that miss by more than they state ---- */
+
+/* Is side i in the band, of a row that misses? */
+static int in_missing_row(const struct matrix *m, size_t i)
+{
+	return i >= m->first && i - m->first < m->rows && misses(m, i - m->first);
+}
+
+/* Both places of a pair that are in the band. */
+static void set_pair(struct matrix *m, size_t i, size_t j, double x)
+{
+	if (i - m->first < m->rows)
+		set(m, i - m->first, j, x);
+	if (j - m->first < m->rows)
+		set(m, j - m->first, i, x);
+}
+
+static void refine_pairs(void *arg, size_t begin, size_t end, int thread)
+{
+	struct matrix *m = arg;
+	struct thread *t = &m->thread[thread];
+	struct doubt *d = m->doubt.data;
+
+	for (size_t k = begin; k < end; k++)
+		if (in_missing_row(m, d[k].i) || in_missing_row(m, d[k].j))
+			set_pair(m, d[k].i, d[k].j, exchange(m, t, d[k].i, d[k].j, &d[k].error));
+}
+
+static void set_fineness(struct matrix *m, int round)
+{
+	double finer = pow(FINER, round);
+
+	for (int t = 0; t < m->job->o.threads; t++) {
+		struct exchange_options *o = &m->thread[t].x.o;
+		o->absolute = m->job->o.target / finer;
+		o->most = (int)(m->job->o.evaluations * finer);
+		o->crowd_rays = (int)(CROWD_RAYS * finer);
+	}
+}
+
+/* Rows whose sums are off by more than their factors state have one that is worse than it
+ * states: all in doubt are computed anew. A pair with a side that is not in the band is so in one
+ * of its two rows only. What still misses stays as the row's residual, for all to see. */
+static int refine_rows(struct matrix *m, struct err *e)
+{
+	size_t off = m->rows;
+
+	for (int round = 1; round <= ROUNDS && off; round++) {
+		off = 0;
+		for (size_t r = 0; r < m->rows; r++)
+			off += (size_t)misses(m, r);
+		if (!off)
+			break;
+		set_fineness(m, round);
+		par_for(m->doubt.n, 4, m->job->o.threads, refine_pairs, m, NULL);
+		judge_all(m);
+	}
+	for (size_t r = 0; r < m->rows; r++)
+		if (misses(m, r) && m->row[r].residual > 0 &&
+		    m->row[r].residual < (double)SURE_RAYS / PROOF_RAYS) {
+			/* No number of rays can tell whether it escapes: so much is in doubt. */
+			m->row[r].error += m->row[r].residual;
+			m->rest[r].escape = m->row[r].residual;
+			m->row[r].residual = 0;
+			m->closed[r] = 0;
+		}
+	set_fineness(m, 0);
+	for (int t = 0; t < m->job->o.threads; t++)
+		if (m->thread[t].e.set)
+			return err_set(e, "%s", m->thread[t].e.text);
+	return 0;
 }
 
 /* Takes the residuals of closed rows out of the factors that are in doubt. The matrix is
@@ -262,6 +371,51 @@ static int close_rows(struct matrix *m, struct err *e)
 	return bad ? -1 : 0;
 }
 
+/* The doubts of each row: a counting sort. */
+static int order_doubts(struct matrix *m, struct err *e)
+{
+	const struct doubt *d = m->doubt.data;
+	size_t *end = mem_new(m->rows + 2, sizeof *end, "errors of pairs", e);
+
+	free(m->doubt_start);
+	free(m->doubt_of_row);
+	m->doubt_start = end;
+	m->doubt_of_row = mem_new(m->doubt.n, 2 * sizeof *m->doubt_of_row, "errors of pairs", e);
+	if (!end || !m->doubt_of_row)
+		return -1;
+	for (size_t k = 0; k < 2 * m->doubt.n; k++) {
+		size_t i = (k % 2 ? d[k / 2].j : d[k / 2].i) - m->first;
+		if (i < m->rows)
+			end[i + 2]++;
+	}
+	for (size_t r = 2; r < m->rows + 2; r++)
+		end[r] += end[r - 1];
+	for (size_t k = 0; k < 2 * m->doubt.n; k++) {
+		size_t i = (k % 2 ? d[k / 2].j : d[k / 2].i) - m->first;
+		if (i < m->rows)
+			m->doubt_of_row[end[i + 1]++] = (uint32_t)(k / 2);
+	}
+	return 0;
+}
+
+/* The errors of the n values that were put last. */
+static int put_errors(struct ff_batch *b, const struct matrix *m, size_t r, size_t n, struct err *e)
+{
+	const struct doubt *d = m->doubt.data;
+	const double area = m->area[m->first + r];
+	int bad = 0;
+
+	for (int pass = 0; pass < 2; pass++) {
+		for (size_t k = m->doubt_start[r]; k < m->doubt_start[r + 1]; k++) {
+			const struct doubt *x = &d[m->doubt_of_row[k]];
+			size_t other = x->i == m->first + r ? x->j : x->i;
+			m->value_error[m->side[other]] = pass ? 0 : (float)(x->error / area);
+		}
+		bad = bad || (!pass && ff_batch_put_errors(b, m->value_error, n, e));
+	}
+	return bad;
+}
+
 static int put_row(struct ff_batch *b, const struct matrix *m, size_t r, struct err *e)
 {
 	struct ff_batch_row *row = &m->row[r];
@@ -271,7 +425,10 @@ static int put_row(struct ff_batch *b, const struct matrix *m, size_t r, struct 
 
 	if (ff_batch_begin(b, e) || ff_batch_reserve(b, m->n, e))
 		return -1;
+	size_t before = b->value.n;
 	sum += ff_batch_put_values(b, m->side, x, m->n, 1 / area);
+	if (m->job->o.pair_errors && put_errors(b, m, r, b->value.n - before, e))
+		return -1;
 	row->scale = sum > 0 ? 1 / sum : 0;
 	return ff_batch_put_block(b, 0, &m->rest[r], e) || ff_batch_put_row(b, row, e) ? -1 : 0;
 }
@@ -280,7 +437,7 @@ static int emit(struct matrix *m, const struct ff_sink *sink, struct ff_stats *s
                 struct err *e)
 {
 	struct ff_batch b = { .f64 = m->job->o.f64 };
-	int bad = 0;
+	int bad = m->job->o.pair_errors && order_doubts(m, e);
 
 	for (size_t r = 0; r < m->rows && !bad; r++) {
 		bad = put_row(&b, m, r, e);
@@ -328,6 +485,8 @@ static int bands(struct matrix *m, size_t begin, size_t end, const struct ff_sin
 		if ((bad = gather_doubts(m, e)))
 			break;
 		judge_all(m);
+		if ((bad = refine_rows(m, e)))
+			break;
 		bad = (m->job->o.close && close_rows(m, e)) || emit(m, sink, stats, e);
 	}
 	free(room);
@@ -340,7 +499,8 @@ static int find_sides(struct matrix *m, struct err *e)
 
 	m->side = mem_new(2 * model->patch.n, sizeof *m->side, "patch-sides", e);
 	m->area = mem_new(2 * model->patch.n, sizeof *m->area, "patch-sides", e);
-	if (!m->side || !m->area)
+	m->value_error = mem_new(2 * model->patch.n, sizeof *m->value_error, "patch-sides", e);
+	if (!m->side || !m->area || !m->value_error)
 		return -1;
 	for (uint32_t ps = 0; ps < 2 * model->patch.n; ps++)
 		if (model_side_modelled(model, ps)) {
@@ -410,6 +570,9 @@ static void matrix_free(struct matrix *m)
 	free(m->rest);
 	free(m->closed);
 	free(m->doubt.data);
+	free(m->doubt_start);
+	free(m->doubt_of_row);
+	free(m->value_error);
 	geo_pair_table_free(&m->table);
 	occ_facet_set_free(&m->facets);
 	occ_occluder_set_free(&m->occluders);

@@ -26,6 +26,7 @@ struct ff_options {
 	uint64_t seed;
 	double target;        /* analytic: absolute error of a partly hidden factor */
 	int evaluations;      /* analytic: the most spent on one */
+	int pair_errors;      /* formulas to patches: the error of each factor is kept */
 	int close;            /* formulas to patches: closed rows are made to add up */
 	int to_patches;       /* columns are patch-sides */
 	int f64;

@@ -55,6 +55,19 @@ double ff_batch_put_values(struct ff_batch *b, const uint32_t *column, const voi
 	return sum;
 }
 
+int ff_batch_put_errors(struct ff_batch *b, const float *error_of_column, size_t n, struct err *e)
+{
+	const uint32_t *column = (const uint32_t *)b->column.data + b->column.n - n;
+
+	if (mem_reserve(&b->value_error, n, sizeof(float), e))
+		return -1;
+	float *to = (float *)b->value_error.data + b->value_error.n;
+	for (size_t i = 0; i < n; i++)
+		to[i] = error_of_column[column[i]];
+	b->value_error.n += n;
+	return 0;
+}
+
 int ff_batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *r,
                        struct err *e)
 {
@@ -161,6 +174,7 @@ struct ff ff_batch_view(const struct ff_batch *b)
 		.block.cut = b->cut.data, .block.arrival = b->block_arrival.data,
 		.entries = b->column.n, .column = b->column.data,
 		.value = b->f64 ? NULL : b->value.data, .value64 = b->f64 ? b->value.data : NULL,
+		.value_error = b->value_error.n ? b->value_error.data : NULL,
 		.arrival.n = b->arrival_target.n, .arrival.target = b->arrival_target.data,
 		.arrival.direction = b->arrival_direction.data,
 		.link.n = b->link_target.n, .link.target = b->link_target.data,
@@ -181,7 +195,7 @@ void ff_batch_free(struct ff_batch *b)
 	struct array *v[] = { &b->row_side, &b->row_kind, &b->row_samples, &b->row_scale,
 		&b->row_residual, &b->row_error, &b->row_block, &b->block_chain,
 		&b->block_start, &b->escape, &b->black, &b->lost, &b->cut, &b->block_arrival,
-		&b->column, &b->value, &b->arrival_target, &b->arrival_direction,
+		&b->column, &b->value, &b->value_error, &b->arrival_target, &b->arrival_direction,
 		&b->link_target, &b->link_source, &b->link_last, &b->link_chain, &b->link_direction,
 		&b->link_row, &b->gathered_rays, &b->gathered_lost, &b->gathered_count, &b->gathered_landing,
 		&b->gathered_chain };

@@ -12,7 +12,7 @@ struct ff_batch {
 	int f64;
 	struct array row_side, row_kind, row_samples, row_scale, row_residual, row_error;
 	struct array row_block, block_chain, block_start, escape, black, lost, cut;
-	struct array block_arrival, column, value;
+	struct array block_arrival, column, value, value_error;
 	struct array arrival_target, arrival_direction;
 	struct array link_target, link_source, link_last, link_chain, link_direction, link_row;
 	struct array gathered_rays, gathered_lost, gathered_count, gathered_landing, gathered_chain;
@@ -42,6 +42,9 @@ double ff_batch_put_value(struct ff_batch *b, uint32_t column, double value);
  * `scale`; returns the sum of what is stored. */
 double ff_batch_put_values(struct ff_batch *b, const uint32_t *column, const void *x, size_t n,
                            double scale);
+
+/* Errors of the last n values, by column; a batch has them for all of its values or none. */
+int ff_batch_put_errors(struct ff_batch *b, const float *error_of_column, size_t n, struct err *e);
 int ff_batch_put_block(struct ff_batch *b, uint32_t chain, const struct tally_rest *rest,
                        struct err *e);
 int ff_batch_put_row(struct ff_batch *b, const struct ff_batch_row *r, struct err *e);

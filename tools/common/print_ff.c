@@ -112,7 +112,10 @@ static void print_entries(const struct ff_file *ff, char *const *name, uint32_t 
 			print_csv(name[f->to_patches ? column : 2 * patch + (column & 1)], ",");
 			if (!f->to_patches)
 				printf("%" PRIu32, receiver);
-			printf(",%.17g\n", f->row.scale[row] * ff_value(f, s.entry + k));
+			printf(",%.17g", f->row.scale[row] * ff_value(f, s.entry + k));
+			if (f->value_error)
+				printf(",%.9g", (double)f->value_error[s.entry + k]);
+			putchar('\n');
 		}
 }
 
@@ -129,8 +132,8 @@ static void print_block_lines(const struct ff_file *ff, char *const *name, uint3
 	print_entries(ff, name, row, b);
 	for (size_t i = 0; i < sizeof rest / sizeof *rest; i++)
 		if (rest[i].value > 0)
-			printf("%" PRIu32 ",%s,,%.17g\n", f->block.chain[b], rest[i].where,
-			       f->row.scale[row] * rest[i].value);
+			printf("%" PRIu32 ",%s,,%.17g%s\n", f->block.chain[b], rest[i].where,
+			       f->row.scale[row] * rest[i].value, f->value_error ? "," : "");
 }
 
 int print_ff_row(const struct ff_file *ff, uint32_t row, struct err *e)
@@ -148,7 +151,7 @@ int print_ff_row(const struct ff_file *ff, uint32_t row, struct err *e)
 	       f->row.kind[row] == FF_LIGHT ? ff->light_name[source - 2 * ff->scene.patches]
 	                                    : name[source], kind[f->row.kind[row]], f->row.samples[row],
 	       f->row.scale[row], (double)f->row.residual[row], (double)f->row.error[row]);
-	printf("chain,to,element,value\n");
+	printf("chain,to,element,value%s\n", f->value_error ? ",error" : "");
 	for (uint64_t b = f->row.block[row]; b < f->row.block[row + 1]; b++)
 		print_block_lines(ff, name, row, b);
 	file_cache_names_free(name, 2 * ff->scene.patches);
