@@ -165,7 +165,7 @@ bench: all $(BENCHES)
 # tables and its plot go into RESULTS.md and README.md, too.
 REPORT := BUILD='$(abspath $(BUILD))' CC='$(CC)' OPT='$(OPT)' PYTHON='$(PYTHON)' \
 	$(PYTHON) tests/bench/report $(if $(FULL),--full) --into tests/bench/RESULTS.md --into README.md --out
-report: all $(BUILD)/bench/rays
+report: all $(BUILD)/bench/rays $(BUILD)/bench/pairs
 	@$(REPORT) $(BUILD)/report
 	cp $(BUILD)/report/speed.png scenes/pictures/speed.png
 

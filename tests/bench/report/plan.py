@@ -17,6 +17,7 @@ class Plan:
     ff_rays: int             # a patch, of their yardstick
     oracles: tuple           # scenes; empty: all
     oracle_methods: tuple
+    pairs: int               # of polygons at random
     hard: bool               # whether hard cases are tried
     lobe_scenes: tuple       # of lobes.py; empty: all
     lobe_exponents: tuple
@@ -50,7 +51,7 @@ PLAN = Plan(
              "clutter": (1024, 16_000_000)},
     ladder=(1, 4, 16, 64, 256), crowd=(10_000, 100_000, 1_000_000), repeat=1, repeat_views=3,
     solutions=99, steps=99, ff_scenes=("cube16", "cube24", "room", "city100"), ff_rays=40960,
-    oracles=(), oracle_methods=("best",), hard=True, lobe_scenes=(), lobe_exponents=(20, 1000),
+    oracles=(), oracle_methods=("best",), pairs=150, hard=True, lobe_scenes=(), lobe_exponents=(20, 1000),
     lobe_schemes=("paper", "centroid", "one lobe", "default"), lobe_samples=4_000_000, lobe_size=.25,
     exponents=EXPONENTS,
     most={("two-pass", "analytic"): 0, ("two-pass", None): 0, ("clutter", "analytic"): 0,
@@ -62,7 +63,7 @@ FULL = Plan(
     ladder=(1, 4, 16, 64, 256, 1024), crowd=(10_000, 100_000, 1_000_000, 10_000_000), repeat=3,
     repeat_views=5, solutions=99, steps=99,
     ff_scenes=("cube16", "cube24", "room", "room-turned", "city100", "city370", "city2100"),
-    ff_rays=409600, oracles=(), oracle_methods=("hemicube", "rays", "best"), hard=True,
+    ff_rays=409600, oracles=(), oracle_methods=("hemicube", "rays", "best"), pairs=2000, hard=True,
     lobe_scenes=(), lobe_exponents=(5, 20, 100, 1000),
     lobe_schemes=("paper", "centroid", "one lobe", "default", "fine"),
     lobe_samples=16_000_000, lobe_size=.25, exponents=EXPONENTS, rooms=100, room_particles=8_000_000)
@@ -71,7 +72,7 @@ QUICK = Plan(
     scenes=("cornell",), samples={name: (32, 100_000) for name in PLAN.scenes},
     ladder=(1, 4), crowd=(1000, 10_000), repeat=1, repeat_views=1, solutions=1, steps=3,
     ff_scenes=("cube16",), ff_rays=4096, oracles=("furnace_hetero_diffuse",), oracle_methods=("best",),
-    hard=False, lobe_scenes=("twice",), lobe_exponents=(20,), lobe_schemes=("paper", "default"),
+    pairs=8, hard=False, lobe_scenes=("twice",), lobe_exponents=(20,), lobe_schemes=("paper", "default"),
     lobe_samples=100_000, lobe_size=.5,
     exponents=(30, 1000, 10_000), rooms=1, room_particles=10_000,
     most={"hemicube": 1, "rays": 1, "auto": 1, "analytic": 0, None: 1})

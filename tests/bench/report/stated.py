@@ -1,5 +1,9 @@
 """What the programs state of their own errors, beside what these are."""
+import os
+
 import uneven
+from exact import markdown
+from measure import ran
 from page import Bar, Table, Title, Words
 from setting import View
 from speed import percent, seconds
@@ -92,6 +96,19 @@ def of_rooms(what, tried):
             percent(worst[len(worst) // 2]), percent(worst[-1])]
 
 
+def pairs(run):
+    """Of form factors of polygons at random, by tests/bench/pairs.c."""
+    run.tell("stated errors of random pairs")
+    head, rows, _ = markdown(ran(os.path.join("bench", "pairs"), 1, run.plan.pairs).text)
+    run.bars.append(Bar("stated error of form factors", "none beyond it and `-t`",
+                        "; ".join(f"{row[-1]} at {row[0]}" for row in rows),
+                        all(row[-1] == "0" for row in rows)))
+    yield Words(f"""Form factors of {run.plan.pairs} random pairs with plates, slats or boxes between, beside
+        brute force: how the ratio of true to stated error is distributed, and how many are off by
+        more than they state, and than that and the error asked for.""")
+    yield Table("Pairs of polygons", head, rows, left=1)
+
+
 def section(run):
     tried = list(rooms(run))
     kinds = sorted({t.kind for t in tried}, key=uneven.KINDS.index)
@@ -124,6 +141,7 @@ def section(run):
     yield Table("Stated against true", ROOMS,
                 [of_rooms(k, [t for t in tried if t.kind == k]) for k in kinds] +
                 [of_rooms("all", tried)], left=1)
+    yield from pairs(run)
     if lobes:
         yield Words("""Lobes of finite exponent in pictures, from what was solved last: by one ray
             about the axis (the paper's way), by samples, and by as many as their noise asks for (the

@@ -504,7 +504,7 @@ static void test_forged_form_factors(void **state)
 	FORGE("column", 4, uint16_t, 2, "array block_column: block 3 ends beyond the last column");
 	refuse_forged("receivers", 0, "walls", 0, "metadata receivers: walls, neither elements");
 	refuse_forged("receivers", 0, "patches", 0, "array column: value 1 is 4, which must be below 4");
-	refuse_forged("version", 0, "1", 0, "version 1, this program knows version 4");
+	refuse_forged("version", 0, "1", 0, "version 1, this program knows version 5");
 }
 
 static void refuse_ff(void *where, const void *value, size_t bytes, const char *message)
