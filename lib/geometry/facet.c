@@ -123,17 +123,25 @@ int geo_facet_halve(const struct facet *f, struct facet_room half[2])
 	return geo_facet_split(f, along, v3_dot(along, f->centre), half);
 }
 
-int geo_facet_quarter(const struct facet *f, struct facet_room quarter[4])
+int geo_facet_quarter_off(const struct facet *f, const double shift[2],
+                          struct facet_room quarter[4])
 {
 	struct facet_room half[2];
-	double along[3] = { 0 }, across[3];
+	double along[3] = { 0 }, across[3], low, high;
 
 	longest_edge(f, along);
 	v3_cross(f->normal, along, across);
-	double middle = v3_dot(across, f->centre);
-	return geo_facet_split(f, along, v3_dot(along, f->centre), half) &&
+	geo_facet_heights(f, across, 0, &low, &high);
+	double middle = v3_dot(across, f->centre) + shift[1] * (high - low);
+	geo_facet_heights(f, along, 0, &low, &high);
+	return geo_facet_split(f, along, v3_dot(along, f->centre) + shift[0] * (high - low), half) &&
 	       geo_facet_split(&half[0].f, across, middle, quarter) &&
 	       geo_facet_split(&half[1].f, across, middle, quarter + 2);
+}
+
+int geo_facet_quarter(const struct facet *f, struct facet_room quarter[4])
+{
+	return geo_facet_quarter_off(f, (const double[2]){ 0, 0 }, quarter);
 }
 
 void geo_facet_point(const struct facet *f, double u, double v, double x[3])

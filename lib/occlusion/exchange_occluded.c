@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "lib/base/rng.h"
 #include "lib/base/vec.h"
 #include "lib/geometry/contour.h"
 #include "lib/geometry/cubature.h"
@@ -24,25 +25,27 @@ struct cell {
 };
 
 /* How errors of cells are estimated. Samples never prove an integral: these were chosen so that of
- * some thousand random pairs none is off by more than it states, and most by a hundredth
- * (tests/bench/report shows the distribution for other pairs). Errors that are a fraction of
- * `uneven` or `whole` shrink with the cell; none shrinks faster than the gains let it. */
+ * some thousand random pairs none is off by more than it states and was asked for, and most by a
+ * hundredth (tests/bench/pairs.c, with other pairs). Errors that are parts of `uneven` or `whole`
+ * shrink with the cell; none shrinks faster than the gains let it. */
 static const double first_least = .1;    /* of the whole, for the first cell */
 static const double cut_error = 1;       /* of `uneven`, for parts that a cut leaves */
 static const double uneven_least = .004; /* of `uneven`, however well parts agree with the whole */
-static const double cut_gain = 4;        /* how many times a cut may lessen the error, */
-static const double quarter_gain = 12;   /* and quartering it: this, and more by as much as parts */
-static const double smooth_gain = 128;   /* agree better than `smooth`, up to this. Ideal is 64. */
-static const double smooth = .003;       /* |whole - parts| / `uneven` of smooth integrands, */
-static const double rough = .03;         /* and of such as have kinks: the difference is the error */
-static const double smooth_error = .125; /* of that difference where the integrand is smooth */
-static const double limit_error = .15;   /* of what an occluder hides in a cell where its shadow ends, */
-static const double missed_part = .3;    /* all of it if the shadow takes less than this of the cell */
-static const double dark_error = .05;    /* of the whole, where points see nothing without proof; */
-static const double dark_gain = 4;       /* a cell within such a one so many times less */
-
+/* How many times a cut may lessen the error; and quartering: more by as much as parts agree better
+ * than smooth ones do, up to a most. A rule of fifth order gains 64. */
+static const double cut_gain = 4, quarter_gain = 12, smooth_gain = 128;
+/* What quartering changes, by `uneven`: of smooth integrands, and of such as have kinks, where the
+ * change is the error; where the integrand is smooth the error is so much of it. */
+static const double smooth = .003, rough = .03, smooth_error = .125;
+/* Of what an occluder hides in a cell where its shadow ends; all if its shadow takes less than
+ * such a part of the cell. */
+static const double limit_error = .15, missed_part = .3;
+/* Of the whole, where points see nothing without proof; within such a cell so many times less. */
+static const double dark_error = .05, dark_gain = 4;
 /* Of the total: errors of many cells partly cancel, those of like ones need not. */
-static const double random_part = 2, common_part = .05;
+static const double random_part = 2, common_part = .1;
+/* How far quarters are from equal, of the length and width. */
+static const double quarter_shift = .08;
 
 /* A count: of the facet seen, to prove that several occluders hide it. 32 parts; a guess. */
 enum { HALVINGS = 5 };
@@ -139,9 +142,11 @@ static void measure(const struct integral *in, struct cell *c, const struct face
 	}
 }
 
+/* What one occluder hides of g from a point. */
 static double hidden_by(const struct integral *in, int occluder, const double x[3])
 {
-	return geo_contour_point(x, in->f->normal, in->g->n, in->g->v) - visible_from(in, (uint64_t)1 << occluder, x);
+	return geo_contour_point(x, in->f->normal, in->g->n, in->g->v) -
+	       visible_from(in, (uint64_t)1 << occluder, x);
 }
 
 /* What occluders whose shadows end in a cell may hide there that its points do not see. */
@@ -160,8 +165,7 @@ static void look_at_limits(const struct integral *in, struct cell *c, const stru
 			c->occluders &= ~((uint64_t)1 << k);
 			continue;
 		}
-		double hidden = part.f.area * hidden_by(in, k, part.f.centre);
-		double doubt = hidden * (part.f.area < missed_part * f->area ? 1 : limit_error);
+		double doubt = part.f.area * hidden_by(in, k, part.f.centre) * (part.f.area < missed_part * f->area ? 1 : limit_error);
 		c->unseen += doubt;
 		if (doubt > worst) {
 			worst = doubt;
@@ -282,7 +286,11 @@ static int divide(const struct integral *in, struct cell *c, struct facet_room p
 
 	if (cut && geo_facet_split(f, cut->normal, cut->offset, part))
 		return 2;
-	return geo_facet_quarter(f, part) ? 4 : 0;
+	/* Not in halves: else the points of all levels may miss lines along its edges alike. */
+	uint64_t dice = rng_mix(in->o->cell.n + (uint64_t)in->o->visible.evaluations);
+	const double shift[2] = { quarter_shift * ((double)(dice & 0xffff) / 0x8000 - 1),
+	                          quarter_shift * ((double)(dice >> 16 & 0xffff) / 0x8000 - 1) };
+	return geo_facet_quarter_off(f, shift, part) ? 4 : 0;
 }
 
 /* The error of all parts of a cell. off: by how much its value changed; quarters: or cut. */
@@ -368,9 +376,12 @@ static int put_whole(struct integral *in, uint64_t occluders, double whole)
 
 /* ---- the integral ---- */
 
+/* The error of the sum of all cells. */
 static double stated(const struct integral *in)
 {
-	return in->stuck + fmin(in->error, common_part * in->error + random_part * sqrt(fmax(0, in->squares)));
+	double likely = common_part * in->error + random_part * sqrt(fmax(0, in->squares));
+
+	return in->stuck + fmin(in->error, likely);
 }
 
 static int integrate(struct integral *in, double tolerance, int most)
@@ -418,7 +429,8 @@ double occ_occluded_exchange(struct occluded *o, struct unoccluded *unoccluded,
                              struct err *e)
 {
 	struct integral in = {
-		.o = o, .unoccluded = unoccluded, .f = l->a, .g = l->b, .near = l->set->near, .e = e, .shadows = &o->shadows
+		.o = o, .unoccluded = unoccluded, .f = l->a, .g = l->b, .near = l->set->near,
+		.shadows = &o->shadows, .e = e
 	};
 
 	make_occluders(o, l, l->b);

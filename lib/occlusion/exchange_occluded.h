@@ -1,7 +1,6 @@
-/* Exchange areas of partly hidden facets. One of them is cut where shadows end, and along edges
- * of what the
- * occluders' shadows can be; cells that see all of the other facet, or nothing, are exact;
- * over the others what their points see exactly is integrated by adaptive cubature. */
+/* Exchange areas of partly hidden facets. One of them is cut where the shadows of occluders end,
+ * and where what they hide changes its law; cells in no shadow, or from which all is surely hidden,
+ * are exact; over the others what their points see exactly is integrated by adaptive cubature. */
 #ifndef TWOPASS_EXCHANGE_OCCLUDED_H
 #define TWOPASS_EXCHANGE_OCCLUDED_H
 
