@@ -485,9 +485,8 @@ static int bands(struct matrix *m, size_t begin, size_t end, const struct ff_sin
 		if ((bad = gather_doubts(m, e)))
 			break;
 		judge_all(m);
-		if ((bad = refine_rows(m, e)))
-			break;
-		bad = (m->job->o.close && close_rows(m, e)) || emit(m, sink, stats, e);
+		bad = refine_rows(m, e) || (m->job->o.close && close_rows(m, e)) ||
+		      emit(m, sink, stats, e);
 	}
 	free(room);
 	return bad;

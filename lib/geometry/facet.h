@@ -43,8 +43,8 @@ int geo_facet_split(const struct facet *f, const double normal[3], double offset
                     struct facet_room part[2]);
 
 /* Splits f through its centre across its longest edge, into halves, or both across and
- * along it, into quarters; or into parts like quarters, the cuts shifted from the centre by parts of
- * its length and width. 0 as above. */
+ * along it, into quarters; or into parts like quarters, the cuts shifted from the centre by
+ * parts of its length and width. 0 as above. */
 int geo_facet_halve(const struct facet *f, struct facet_room half[2]);
 int geo_facet_quarter(const struct facet *f, struct facet_room quarter[4]);
 int geo_facet_quarter_off(const struct facet *f, const double shift[2],

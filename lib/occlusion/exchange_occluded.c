@@ -64,6 +64,7 @@ struct integral {
 	double value;                 /* of all cells, and what is exact */
 	double error, squares;        /* sums over the cells in the heap */
 	double stuck;                 /* errors of cells too small to divide */
+	uint64_t quartered;           /* cells */
 	struct err *e;
 };
 
@@ -165,7 +166,8 @@ static void look_at_limits(const struct integral *in, struct cell *c, const stru
 			c->occluders &= ~((uint64_t)1 << k);
 			continue;
 		}
-		double doubt = part.f.area * hidden_by(in, k, part.f.centre) * (part.f.area < missed_part * f->area ? 1 : limit_error);
+		double share = part.f.area < missed_part * f->area ? 1 : limit_error;
+		double doubt = share * part.f.area * hidden_by(in, k, part.f.centre);
 		c->unseen += doubt;
 		if (doubt > worst) {
 			worst = doubt;
@@ -277,7 +279,7 @@ static const struct plane *best_cut(const struct integral *in, const struct shad
 
 /* The parts that a cell is refined into: on both sides of the edge of a shadow, or
  * quarters. Returns their number. */
-static int divide(const struct integral *in, struct cell *c, struct facet_room part[4])
+static int divide(struct integral *in, struct cell *c, struct facet_room part[4])
 {
 	const struct facet *f = shape_of(c);
 	const struct plane *cut = c->limit && c->unseen >= c->error / 2 ?
@@ -287,7 +289,7 @@ static int divide(const struct integral *in, struct cell *c, struct facet_room p
 	if (cut && geo_facet_split(f, cut->normal, cut->offset, part))
 		return 2;
 	/* Not in halves: else the points of all levels may miss lines along its edges alike. */
-	uint64_t dice = rng_mix(in->o->cell.n + (uint64_t)in->o->visible.evaluations);
+	uint64_t dice = rng_mix(++in->quartered);
 	const double shift[2] = { quarter_shift * ((double)(dice & 0xffff) / 0x8000 - 1),
 	                          quarter_shift * ((double)(dice >> 16 & 0xffff) / 0x8000 - 1) };
 	return geo_facet_quarter_off(f, shift, part) ? 4 : 0;

@@ -76,8 +76,8 @@ int main(int argc, char **argv)
 		}
 		random_pair_free(&p);
 	}
-	printf("| `-t` | evaluations | µs | median | 90 %% | 99 %% | most | beyond stated | beyond both |\n"
-	       "|---|---|---|---|---|---|---|---|---|\n");
+	printf("| `-t` | evaluations | µs | median | 90 %% | 99 %% | most | beyond stated | "
+	       "beyond both |\n|---|---|---|---|---|---|---|---|---|\n");
 	for (int t = 0; t < TARGETS; t++) {
 		struct found *f = &found[t];
 		qsort(f->ratio, count, sizeof *f->ratio, by_size);

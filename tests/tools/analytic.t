@@ -66,6 +66,21 @@ costs() {
 costs cube12 4.2 1e-6
 costs city100 8 1e-4
 
+# Each factor's own error; a row that misses by more than it states is refused.
+prepare ffcalc --to patches -t 1e-4 --pair-errors "$T/c.mesh" -o "$T/e.ff"
+cat >"$T/errors.py" <<'END'
+import sys
+from chain import container
+import numpy as np
+_, a = container(sys.argv[1])
+start = a["block_start"].astype(int)
+sums = np.array([a["value_error"][i:j].sum(dtype=float) for i, j in zip(start, start[1:])])
+# Factors of 0 have an error, too, but no entry.
+assert (sums <= (1 + 1e-5) * a["row_error"]).all() and sums.sum() > .5 * a["row_error"].sum()
+END
+check "errors of factors are those of rows" "$PYTHON" "$T/errors.py" "$T/e.ff"
+check "inspect --row shows them" sh -c "inspect --row 0 '$T/e.ff' | grep -q '^chain,to,element,value,error$'"
+
 # A row of spans that others share, as inspect and the program in ff(5) read it.
 prepare "$PYTHON" "$top/tests/bench/ff_scenes.py" cube6 "$T/c.gltf"
 prepare mesh -p inf -e inf "$T/c.gltf" -o "$T/c.mesh"

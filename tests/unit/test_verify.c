@@ -94,18 +94,19 @@ static void test_matrix_of_patches(void **state)
 }
 
 /* Two plates of areas 1 and 2 that see only each other: F_01 = .5, F_10 = .25. */
-static void exchange(double f01, double f10, double error, struct verify *v)
+static void exchange_of(double f01, double f10, double error, uint32_t rays, double residual,
+                        struct verify *v)
 {
-	uint32_t start[] = { 0, 1, 2 }, side[] = { 0, 2 }, samples[] = { 1, 1 }, chain[] = { 0, 0 };
+	uint32_t start[] = { 0, 1, 2 }, side[] = { 0, 2 }, samples[] = { rays, rays }, chain[] = { 0, 0 };
 	uint32_t column[] = { 2, 0 };
 	double area[] = { 1, 2 }, scale[] = { 1, 1 }, zero[] = { 0, 0 };
-	float errors[] = { (float)error, (float)error }, nought[] = { 0, 0 };
+	float errors[] = { (float)error, (float)error }, residuals[] = { (float)residual, 0 };
 	double value[] = { f01, f10 }, escape[] = { 1 - f01, 1 - f10 };
 	uint64_t row_block[] = { 0, 1, 2 }, block_start[] = { 0, 1, 2 }, arrival[] = { 0, 0, 0 };
 	uint64_t chain_start[] = { 0, 0 };
 	uint8_t kind[] = { FF_DIFFUSE, FF_DIFFUSE }, front[] = { 1, 1 };
 	const struct ff f = { .chain.n = 1, .chain.most = 2, .chain.start = chain_start, .row.n = 2, .row.side = side,
-		.row.kind = kind, .row.samples = samples, .row.scale = scale, .row.residual = nought,
+		.row.kind = kind, .row.samples = samples, .row.scale = scale, .row.residual = residuals,
 		.row.error = errors, .row.block = row_block, .block.n = 2, .block.chain = chain,
 		.block.start = block_start, .block.escape = escape, .block.black = zero,
 		.block.lost = zero, .block.cut = zero, .block.arrival = arrival, .entries = 2,
@@ -115,6 +116,11 @@ static void exchange(double f01, double f10, double error, struct verify *v)
 
 	assert_int_equal(ff_check(&f, &s, &e), 0);
 	assert_int_equal(ff_verify(&f, &s, v, &e), 0);
+}
+
+static void exchange(double f01, double f10, double error, struct verify *v)
+{
+	exchange_of(f01, f10, error, 1, 0, v);
 }
 
 static int all_good(const struct verify *v)
@@ -142,6 +148,20 @@ static void test_reciprocity(void **state)
 	assert_false(all_good(&v));
 	exchange(.5, 0, .01, &v);
 	assert_false(all_good(&v));
+}
+
+/* What a row by formula misses must be within what it states; rays always close. */
+static void test_residual(void **state)
+{
+	struct verify v;
+
+	(void)state;
+	exchange_of(.5, .25, .001, 0, .0009, &v);
+	assert_true(all_good(&v));
+	exchange_of(.5, .25, .001, 0, -.0011, &v);
+	assert_false(all_good(&v));
+	exchange_of(.5, .25, .001, 1, .5, &v);
+	assert_true(all_good(&v));
 }
 
 static void test_ledger(void **state)
@@ -235,6 +255,7 @@ int main(void)
 		cmocka_unit_test(test_matrix_of_patches),
 		cmocka_unit_test(test_spans),
 		cmocka_unit_test(test_reciprocity),
+		cmocka_unit_test(test_residual),
 		cmocka_unit_test(test_ledger),
 		cmocka_unit_test(test_side_rows),
 	};
