@@ -32,8 +32,8 @@ static const double first_least = .1;    /* of the whole, for the first cell */
 static const double cut_error = 1;       /* of `uneven`, for parts that a cut leaves */
 static const double uneven_least = .004; /* of `uneven`, however well parts agree with the whole */
 /* How many times a cut may lessen the error; and quartering: more by as much as parts agree better
- * than smooth ones do, up to a most. A rule of fifth order gains 64. */
-static const double cut_gain = 4, quarter_gain = 12, smooth_gain = 128;
+ * than smooth ones do, up to a most: half of what a rule of fifth order gains. */
+static const double cut_gain = 4, quarter_gain = 12, smooth_gain = 32;
 /* What quartering changes, by `uneven`: of smooth integrands, and of such as have kinks, where the
  * change is the error; where the integrand is smooth the error is so much of it. */
 static const double smooth = .003, rough = .03, smooth_error = .125;
