@@ -15,6 +15,7 @@
 #include "lib/radiosity/light_groups.h"
 #include "lib/radiosity/radiosity.h"
 #include "lib/radiosity/transport.h"
+#include "lib/radiosity/uneven.h"
 #include "tools/common/cli.h"
 #include "tools/common/key.h"
 
@@ -355,6 +356,7 @@ static double uneven_part(const struct job *j)
 static char *report_text(const struct job *j)
 {
 	const struct radiosity_report *r = &j->report;
+	int known = radiosity_uneven_known(&j->t);
 	json_t *ledger = json_object(), *o;
 	char *text;
 
@@ -364,14 +366,15 @@ static char *report_text(const struct job *j)
 			json_array_append_new(band, json_real(ledger_of(&j->s, term, k)));
 		json_object_set_new(ledger, term_name[term], band);
 	}
-	o = json_pack("{s:o, s:f, s:I, s:i, s:f, s:o, s:f, s:o, s:f, s:f, s:f, s:f, s:f}", "ledger", ledger,
+	o = json_pack("{s:o, s:f, s:I, s:i, s:f, s:o, s:f, s:o, s:f, s:f, s:o, s:o, s:f}", "ledger", ledger,
 	              "passes", r->passes, "shots", (json_int_t)j->s.shots, "components", r->components,
 	              "unshot", r->unshot, "truncation_bound", number(r->bound),
 	              "guessed_directions", r->guessed, "ledger_residual", number(r->residual),
 	              "mean_error", solution_mean_error(&j->m, &j->s),
 	              "sampling", solution_relative_rms(&j->m, &j->s, j->s.error.sampling),
-	              "uneven", uneven_part(j),
-	              "uneven_left", solution_relative_rms(&j->m, &j->s, j->s.error.uneven),
+	              "uneven", known ? json_real(uneven_part(j)) : json_null(),
+	              "uneven_left", known ? json_real(solution_relative_rms(&j->m, &j->s, j->s.error.uneven))
+	                                   : json_null(),
 	              "discretisation", solution_relative_rms(&j->m, &j->s, j->s.error.discretisation));
 	text = json_dumps(o, JSON_COMPACT);
 	json_decref(o);
@@ -413,8 +416,12 @@ static void print_report(const struct job *j)
 	fprintf(out, "sampling      %.3g relative standard error of irradiance, mean over area; "
 	        "%.3g rms\n", solution_mean_error(&j->m, s),
 	        solution_relative_rms(&j->m, s, s->error.sampling));
-	fprintf(out, "uneven        %.3g of irradiance made up for patches that are not evenly lit; "
-	        "%.3g left (estimate), rms\n", uneven_part(j), solution_relative_rms(&j->m, s, s->error.uneven));
+	if (radiosity_uneven_known(&j->t))
+		fprintf(out, "uneven        %.3g of irradiance made up for patches that are not evenly lit; "
+		        "%.3g left (estimate), rms\n", uneven_part(j),
+		        solution_relative_rms(&j->m, s, s->error.uneven));
+	else
+		fprintf(out, "uneven        not known: no elements gathered\n");
 	fprintf(out, "elements      %.3g relative error of irradiance between elements "
 	        "(estimate), rms over area\n",
 	        solution_relative_rms(&j->m, s, s->error.discretisation));
