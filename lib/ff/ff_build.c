@@ -93,7 +93,7 @@ static int gather(struct ff_job *j, const struct ff *whole, struct ff_stats *sta
 	struct part_progress pp = { progress, 0, 2. * (double)j->m->patch.n };
 	struct progress inner = { report, &pp };
 
-	if (!j->o.gather || j->o.method == FF_HEMICUBE)
+	if (!j->o.gather)
 		return 0;
 	return ff_reciprocal_cast(j, whole->patch_begin, whole->patch_end, &stats->rays, &inner, e) ||
 	       (j->reciprocal.rays && ff_share_rays(j, e)) ? -1 : 0;

@@ -277,7 +277,7 @@ int ff_reciprocal_cast(struct ff_job *j, uint32_t begin, uint32_t end, double *r
 	size_t threads = j->o.threads > 0 ? (size_t)j->o.threads : 1;
 	struct gatherer g = { .job = j, .to = &j->reciprocal, .landings = &j->landings,
 	                      .begin = begin, .end = j->o.to_patches ? begin : end };
-	int useful = any_takes(j) || any_by_formula(j), bad;
+	int useful = j->o.method != FF_HEMICUBE && (any_takes(j) || any_by_formula(j)), bad;
 
 	if (!useful && j->o.to_patches)
 		return 0;

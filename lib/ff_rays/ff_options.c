@@ -1,8 +1,10 @@
 #include "lib/ff_rays/ff_options.h"
 
 /* Counts, the defaults of ffcalc; what they cost and bring is in tests/bench/RESULTS.md (make
- * report). An element gathers with at least 16 rays, four replicates of four. */
-enum { RAYS = 4096, HEMICUBE_PIXELS = 64, HEMICUBE_PIXELS_MAX = 8192, GATHER_LEAST = 16 };
+ * report). An element gathers with at least 16 rays, four replicates of four; beside hemicubes, only
+ * for what uneven patches do, a guess. */
+enum { RAYS = 4096, HEMICUBE_PIXELS = 64, HEMICUBE_PIXELS_MAX = 8192, GATHER_LEAST = 16,
+       HEMICUBE_GATHER = 64 };
 
 /* A sixteenth of the rays; formulas need some in any case. */
 static uint32_t usual_gather(const struct ff_options *o)
@@ -29,7 +31,8 @@ int ff_options_complete(struct ff_options *o, struct err *e)
 		if (o->rays % 2 || o->rays > HEMICUBE_PIXELS_MAX)
 			return err_set(e, "%u samples: a hemicube's resolution is even and at most %d",
 			               o->rays, HEMICUBE_PIXELS_MAX);
-		o->gather = 0;
+		if (o->paper || o->gather == FF_GATHER_UNSET)
+			o->gather = o->paper ? 0 : HEMICUBE_GATHER;
 		return 0;
 	}
 	o->rays = o->rays ? (o->rays + 3) / 4 * 4 : RAYS;
