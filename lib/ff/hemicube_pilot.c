@@ -13,14 +13,15 @@
 /* Of the squared difference of a row from its pilots: what is left at least when their own
  * variance is taken away. A guess that keeps luck from looking like exactness;
  * tests/independent/hemicube_errors.py measures the errors that are stated with it. */
-static const double left_at_least = .25;
+static const double left_at_least = .05;
 
 int ff_hemicube_pilot_init(struct ff_thread *t, struct err *e)
 {
 	const struct ff_job *j = t->job;
 
 	t->pilot_sum = mem_new(2 * j->m->element.n, sizeof *t->pilot_sum, "hemicube errors", e);
-	t->pilot_item = mem_new(j->grid.pixels, FF_PILOTS * sizeof *t->pilot_item, "hemicube errors", e);
+	t->pilot_item = mem_new(j->grid.pixels, FF_PILOTS * sizeof *t->pilot_item,
+	                        "hemicube errors", e);
 	return t->pilot_sum && t->pilot_item ? 0 : -1;
 }
 
@@ -41,7 +42,8 @@ static void look(struct ff_thread *t, uint32_t ps, uint32_t i)
 	}
 	ray_leave(j->rays, n, eye);
 	ff_hemicube_render(&t->cube, j->cubes, eye, (const double (*)[3])frame, HEMICUBE_VOID);
-	memcpy(t->pilot_item + i * j->grid.pixels, t->cube.item, j->grid.pixels * sizeof *t->pilot_item);
+	memcpy(t->pilot_item + i * j->grid.pixels, t->cube.item,
+	       j->grid.pixels * sizeof *t->pilot_item);
 	for (size_t k = 0; k < j->grid.pixels; k++)
 		if (t->cube.item[k] != HEMICUBE_VOID)
 			t->pilot_sum[t->cube.item[k]][i] += j->grid.delta[k];

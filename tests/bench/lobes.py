@@ -156,7 +156,8 @@ def truth(mesh, samples):
 
 def solve(path, options):
     run("ffcalc", path(".mesh"), "-o", path(".ff"), *options)
-    run("shoot", path(".mesh"), path(".ff"), "-o", path(".rad"), "-e", "1e-5")
+    paper = ["--paper"] if "--paper" in options else []
+    run("shoot", *paper, path(".mesh"), path(".ff"), "-o", path(".rad"), "-e", "1e-5")
     return chain_field(path(".rad"))[0]
 
 
