@@ -23,6 +23,7 @@ from oracles import chain_field
 
 SCHEMES = {
     "paper": ["--paper"],
+    "paper closed": ["--paper=closed"],
     "hemicube": ["-m", "hemicube", "--links", "centroid"],
     "centroid": ["--links", "centroid"],
     "one lobe": ["--lobe-depth", "0"],
@@ -156,7 +157,7 @@ def truth(mesh, samples):
 
 def solve(path, options):
     run("ffcalc", path(".mesh"), "-o", path(".ff"), *options)
-    paper = ["--paper"] if "--paper" in options else []
+    paper = ["--paper"] if any("--paper" in o for o in options) else []
     run("shoot", *paper, path(".mesh"), path(".ff"), "-o", path(".rad"), "-e", "1e-5")
     return chain_field(path(".rad"))[0]
 
@@ -199,7 +200,7 @@ def compare(name, n, schemes, samples, size, refine=0):
 def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     p.add_argument("-n", default="20,1000", help="exponents")
-    p.add_argument("-s", "--schemes", default="paper,centroid,one lobe,default",
+    p.add_argument("-s", "--schemes", default="paper,paper closed,centroid,one lobe,default",
                    help=", ".join(SCHEMES))
     p.add_argument("--size", type=float, default=.25, help="of patches and elements")
     p.add_argument("--samples", type=int, default=4000000, help="particles of the yardstick")

@@ -52,7 +52,8 @@ PLAN = Plan(
     ladder=(1, 4, 16, 64, 256), crowd=(10_000, 100_000, 1_000_000), repeat=1, repeat_views=3,
     solutions=99, steps=99, ff_scenes=("cube16", "cube24", "room", "city100"), ff_rays=40960,
     oracles=(), oracle_methods=("best",), pairs=150, hard=True, lobe_scenes=(), lobe_exponents=(20, 1000),
-    lobe_schemes=("paper", "centroid", "one lobe", "default"), lobe_samples=4_000_000, lobe_size=.25,
+    lobe_schemes=("paper", "paper closed", "centroid", "one lobe", "default"),
+    lobe_samples=4_000_000, lobe_size=.25,
     exponents=EXPONENTS,
     most={("two-pass", "analytic"): 0, ("two-pass", None): 0, ("clutter", "analytic"): 0,
           ("clutter", "hemicube"): 0, ("clutter", "rays"): 2, ("clutter", "auto"): 3,
@@ -65,7 +66,7 @@ FULL = Plan(
     ff_scenes=("cube16", "cube24", "room", "room-turned", "city100", "city370", "city2100"),
     ff_rays=409600, oracles=(), oracle_methods=("hemicube", "rays", "best"), pairs=2000, hard=True,
     lobe_scenes=(), lobe_exponents=(5, 20, 100, 1000),
-    lobe_schemes=("paper", "centroid", "one lobe", "default", "fine"),
+    lobe_schemes=("paper", "paper closed", "centroid", "one lobe", "default", "fine"),
     lobe_samples=16_000_000, lobe_size=.25, exponents=EXPONENTS, rooms=100, room_particles=8_000_000)
 QUICK = Plan(
     about="A quick try of the programs: samples are so few that the errors mean nothing.",
