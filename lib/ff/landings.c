@@ -106,6 +106,16 @@ static uint32_t landing_of(const struct ff_job *j, const struct gathering *g)
 	                  fmax(0, (a * y - b * x) / all));
 }
 
+void ff_landings_fetch(const struct ff_landings *l, uint32_t n, const struct ff_ray_batch *b)
+{
+	for (uint32_t i = 0; i < n; i++)
+		if (b->ray.triangle[i] != RAY_MISS) {
+			const char *element = (const char *)&l->job->element[b->hit[i]];
+			__builtin_prefetch(element);
+			__builtin_prefetch(element + 64);
+		}
+}
+
 static void put(struct ff_landings *l, uint32_t column, const struct gathering *g, struct err *e)
 {
 	const struct ff_job *j = l->job;

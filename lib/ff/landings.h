@@ -16,6 +16,9 @@ void ff_landings_begin(struct ff_landings *l, uint32_t column, uint32_t rays, in
 uint32_t ff_landings_add(struct ff_landings *l, uint32_t column, const struct ff_ray_batch *b,
                          uint32_t i, int thread, struct err *e);
 
+/* Fetches what n rays of a batch need, some time before they are added. */
+void ff_landings_fetch(const struct ff_landings *l, uint32_t n, const struct ff_ray_batch *b);
+
 /* All rays of an element-side are done; so many met nothing or black sides. */
 void ff_landings_end(struct ff_landings *l, uint32_t column, uint32_t lost);
 

@@ -77,6 +77,8 @@ static void cast(struct gatherer *g, uint32_t column, int land, int thread, uint
 	for (uint32_t first = 0; first < rays; first += RAY_BATCH) {
 		uint32_t n = rays - first < RAY_BATCH ? rays - first : RAY_BATCH;
 		ff_rays_from_element(j, samples, seeds, column, first, n, &b);
+		if (land)
+			ff_landings_fetch(g->landings, n, &b);
 		for (uint32_t i = 0; i < n; i++) {
 			if (b.ray.triangle[i] == RAY_MISS) {
 				lost[0]++;
