@@ -445,7 +445,9 @@ double occ_occluded_exchange(struct occluded *o, struct unoccluded *unoccluded,
 	o->cell.n = o->heap.n = 0;
 	uint64_t all = o->occluders ? UINT64_MAX >> (64 - o->occluders) : 0;
 	double whole = geo_unoccluded_exchange(unoccluded, in.f, none, in.g, none);
-	occ_shadow_edges(o->visible.occluder, o->occluders, in.f, in.g, in.near, in.shadows);
+	/* Where all of it would not matter, neither does where shadows end: as of no occluders. */
+	occ_shadow_edges(o->visible.occluder, whole > tolerance ? o->occluders : 0, in.f, in.g,
+	                 in.near, in.shadows);
 	if (put_whole(&in, all & ~in.shadows->idle, whole) || integrate(&in, tolerance, most))
 		return NAN;
 	*error = in.error;
