@@ -14,8 +14,8 @@
 enum { IMAGES_MOST = 1 << 15, ORDERS_MOST = 4 };
 
 /* Chains that leave less than such a part of an emitter's light in all bands are left to the lobes'
- * samples: by one mirror, and by several, of which most look past one another, so that aiming at all
- * that they might show costs more than it finds. A window pane reflects .08. Guesses; on
+ * samples: by one mirror, and by several, of which most look past one another, so that aiming
+ * at all that they might show costs more than it finds. A window pane reflects .08. Guesses; on
  * scenes/two-pass.gltf chains of .07 by two made views noisier by 15 %. */
 static const double least_part = .05, least_part_longer = .25;
 

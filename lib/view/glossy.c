@@ -27,13 +27,13 @@ static const double together = .8;
  * less than the noise of samples that stop at an error of 5 %. */
 static const double worth_aiming = .02;
 
-/* What a lobe behind one that is sampled carries less than, relative to that one, goes on by as much
- * less chance. A guess. */
+/* What a lobe behind one that is sampled carries less than, relative to that one, goes on by as
+ * much less chance. A guess. */
 static const double worth_following = .25;
 
-/* How far what tells of later lobes of a kind moves towards what the last one told: the mean of about
- * the last two, which are of the same pixel as a rule. Of .25, .5 and .75 the first two were alike on
- * scenes/two-pass.gltf, and .75 a tenth noisier. */
+/* How far what tells of later lobes of a kind moves towards what the last one told: the mean of
+ * about the last two, which are of the same pixel as a rule. Of .25, .5 and .75 the first two were
+ * alike on scenes/two-pass.gltf, and .75 a tenth noisier. */
 static const double forgets = .5;
 
 /* Sums over the samples of a part. */

@@ -34,7 +34,8 @@ static void put_request(struct view_walker *w, const struct view_branch *b, stru
 }
 
 /* Adds the error of the interpolated light that a side shows. */
-static void add_error(struct view_walker *w, const struct view_branch *b, const struct view_point *p)
+static void add_error(struct view_walker *w, const struct view_branch *b,
+                      const struct view_point *p)
 {
 	const struct view_side *s = view_side_at(w->v, p);
 	size_t bands = (size_t)w->v->m->bands;
@@ -118,8 +119,9 @@ static void add_highlights(struct view_walker *w, const struct view_branch *b,
 }
 
 /* Follows a finite lobe, by samples or by one ray about its axis. */
-static void branch_into(struct view_walker *w, const struct view_branch *b, const struct view_point *p,
-                        const struct view_lobe *lobe, int side, struct view_branch *next)
+static void branch_into(struct view_walker *w, const struct view_branch *b,
+                        const struct view_point *p, const struct view_lobe *lobe, int side,
+                        struct view_branch *next)
 {
 	const struct view_side *s = view_side_at(w->v, p);
 	struct aim_lobe l = { .k = lobe->k, .cosine = fmax(p->cosine, cosine_least),

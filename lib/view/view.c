@@ -31,8 +31,8 @@ static const double usual_error = .1;
 static const double usual_lobe_error = .05;
 
 /* Variance of the mean of n samples that are stratified over a pixel over that of samples
- * which are not, divided by sqrt(n). Of straight edges at random it is .42, .59, .71 and .78 with 2,
- * 4, 8 and 16 samples, of those along rows and columns of pixels .24, .20, .16 and .13 (4000 edges
+ * which are not, divided by sqrt(n). Of straight edges at random it is .42, .59, .71 and .78 with
+ * 2, 4, 8 and 16 samples, of those along rows and columns of pixels .24, .20, .16 and .13 (4000 edges
  * each, against 60 x 60 points a pixel; test_methods.c has such edges). */
 static const double stratified = .5;
 
@@ -383,7 +383,8 @@ static int new_worker(const struct render *r, struct worker *k, int thread, stru
 
 	k->stack = mem_new(view_stack_size(r->o), sizeof *k->stack, "ray stacks", e);
 	k->unrest = mem_new(r->v->m->material.n, 4 * sizeof *k->unrest, "lobes", e);
-	if (!k->stack || !k->unrest || new_sums(&k->slots, ROUND * values, e) || new_sums(&k->sums, values, e))
+	if (!k->stack || !k->unrest || new_sums(&k->slots, ROUND * values, e) ||
+	    new_sums(&k->sums, values, e))
 		return -1;
 	if (!shades(r))
 		return 0;

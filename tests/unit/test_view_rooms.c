@@ -1,5 +1,5 @@
-/* Rooms of lobes, mirrors, panes and lamps drawn at random: what pictures state of the noise of lobes,
- * and that this has no bias. */
+/* Rooms of lobes, mirrors, panes and lamps drawn at random: what pictures state of the noise of
+ * lobes, and that this has no bias. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -160,7 +160,7 @@ static void test_rooms(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(test_rooms) };
+	const struct CMUnitTest tests[] = { slow_unit_test(test_rooms) };
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
