@@ -177,7 +177,7 @@ static void test_landing(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_surfaces), cmocka_unit_test(test_resumed), cmocka_unit_test(test_landing),
+		slow_unit_test(test_surfaces), cmocka_unit_test(test_resumed), cmocka_unit_test(test_landing),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
