@@ -389,6 +389,24 @@ static void print_groups(const struct solution *s, FILE *out)
 	fprintf(out, "\n");
 }
 
+static void print_errors(const struct job *j, FILE *out)
+{
+	const struct solution *s = &j->s;
+
+	fprintf(out, "sampling      %.3g relative standard error of irradiance, mean over area; "
+	        "%.3g rms\n", solution_mean_error(&j->m, s),
+	        solution_relative_rms(&j->m, s, s->error.sampling));
+	if (radiosity_uneven_known(&j->t))
+		fprintf(out, "uneven        %.3g of irradiance made up for patches that are not evenly lit; "
+		        "%.3g left (estimate), rms\n", uneven_part(j),
+		        solution_relative_rms(&j->m, s, s->error.uneven));
+	else
+		fprintf(out, "uneven        not known: no elements gathered\n");
+	fprintf(out, "elements      %.3g relative error of irradiance between elements "
+	        "(estimate), rms over area\n",
+	        solution_relative_rms(&j->m, s, s->error.discretisation));
+}
+
 static void print_report(const struct job *j)
 {
 	const struct solution *s = &j->s;
@@ -413,18 +431,7 @@ static void print_report(const struct job *j)
 		       r->bound);
 	else
 		fprintf(out, "truncation    no finite bound\n");
-	fprintf(out, "sampling      %.3g relative standard error of irradiance, mean over area; "
-	        "%.3g rms\n", solution_mean_error(&j->m, s),
-	        solution_relative_rms(&j->m, s, s->error.sampling));
-	if (radiosity_uneven_known(&j->t))
-		fprintf(out, "uneven        %.3g of irradiance made up for patches that are not evenly lit; "
-		        "%.3g left (estimate), rms\n", uneven_part(j),
-		        solution_relative_rms(&j->m, s, s->error.uneven));
-	else
-		fprintf(out, "uneven        not known: no elements gathered\n");
-	fprintf(out, "elements      %.3g relative error of irradiance between elements "
-	        "(estimate), rms over area\n",
-	        solution_relative_rms(&j->m, s, s->error.discretisation));
+	print_errors(j, out);
 	if (r->guessed > 0)
 		fprintf(out, "directions    %.3g of what is emitted used the nearest known direction\n",
 		       r->guessed);

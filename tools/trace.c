@@ -110,6 +110,17 @@ static const struct option_spec option_table[] = {
 	{ 0 }
 };
 
+static void settle_paper(struct trace *t)
+{
+	const struct cli *c = &t->cli;
+
+	if (options_given(c, "diffuse") || options_given(c, "lobe-samples") ||
+	    options_given(c, "gather-rays"))
+		cli_usage(c, "--paper goes without -d, --lobe-samples and --gather-rays, which it sets");
+	t->method = VIEW_MESH;
+	t->view.lobe_samples = 0;
+}
+
 static void settle(struct trace *t, int operand)
 {
 	const struct cli *c = &t->cli;
@@ -128,13 +139,8 @@ static void settle(struct trace *t, int operand)
 	if (t->budget > 0 && (t->view.relative > 0 || options_given(c, "samples") ||
 	                      options_given(c, "gather-rays")))
 		cli_usage(c, "--budget goes without -t, --samples and --gather-rays, which it chooses");
-	if (t->paper && (options_given(c, "diffuse") || options_given(c, "lobe-samples") ||
-	                 options_given(c, "gather-rays")))
-		cli_usage(c, "--paper goes without -d, --lobe-samples and --gather-rays, which it sets");
-	if (t->paper) {
-		t->method = VIEW_MESH;
-		t->view.lobe_samples = 0;
-	}
+	if (t->paper)
+		settle_paper(t);
 	if (!options_given(c, "samples") && t->view.relative > 0)
 		t->view.samples = TARGET_SAMPLES;
 	for (size_t i = 0; i < t->camera.n; i++)

@@ -6,7 +6,7 @@
 #include "lib/ff/exchange_matrix.h"
 #include "lib/ff/ff_job.h"
 #include "lib/ff/ff_stats.h"
-#include "lib/ff/landings.h"
+#include "lib/ff_rays/landings.h"
 #include "lib/ff/row_hemicube.h"
 #include "lib/ff/row_light.h"
 #include "lib/ff/row_paper.h"

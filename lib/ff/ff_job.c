@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 #include "lib/ff/hemicube_pilot.h"
-#include "lib/ff/landings.h"
+#include "lib/ff_rays/landings.h"
 #include "lib/ff/row_reciprocal.h"
 #include "lib/ff_rays/chain_limit.h"
 #include "lib/ff_rays/ray_samples.h"

@@ -11,7 +11,7 @@
 
 #include "lib/base/mem.h"
 #include "lib/base/vec.h"
-#include "lib/ff/landings.h"
+#include "lib/ff_rays/landings.h"
 #include "lib/ff/row_emitter.h"
 #include "lib/ff_rays/ray_budget.h"
 #include "lib/ff_rays/ray_samples.h"

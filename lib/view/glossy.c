@@ -7,8 +7,8 @@
 #include "lib/base/rng.h"
 #include "lib/base/vec.h"
 #include "lib/scatter/lobe.h"
+#include "lib/view/aimed_ray.h"
 #include "lib/view/shade_tile.h"
-#include "lib/view/specular_path.h"
 
 /* Counts of samples, powers of two, which Sobol points fill evenly. Guesses; README.md has what
  * lobes cost in pictures (tests/bench/report). */

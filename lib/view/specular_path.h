@@ -17,14 +17,6 @@ struct view_first {
  * the radiance it brings to w's parts. b is overwritten. */
 void view_follow(struct view_walker *w, struct view_branch *b);
 
-/* What a ray that is aimed at an image of an emitter came by. */
-enum view_aimed { VIEW_AIMED_STRAIGHT = 1, VIEW_AIMED_ROUND };
-
-/* Follows it from where `from` begins, through panes and by the mirrors of the image's chain, and
- * multiplies value[bands] by what it brings. 0 if anything is between. */
-int view_aimed(struct view_walker *w, const struct view_branch *from, const double dir[3],
-               uint32_t image, double *value);
-
 /* The surface the ray meets first. */
 void view_first_seen(const struct view_scene *v, const double org[3], const double dir[3],
                      struct view_first *first);

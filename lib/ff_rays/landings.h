@@ -1,5 +1,5 @@
 /* What element-sides see, element by element: where the rays landed that they gathered with,
- * straight and by mirrors, panes and lobes (private to lib/ff). */
+ * straight and by mirrors, panes and lobes (for lib/ff). */
 #ifndef TWOPASS_LANDINGS_H
 #define TWOPASS_LANDINGS_H
 

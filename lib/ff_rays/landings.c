@@ -1,4 +1,4 @@
-#include "lib/ff/landings.h"
+#include "lib/ff_rays/landings.h"
 
 #include <math.h>
 #include <stdlib.h>
