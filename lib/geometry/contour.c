@@ -17,7 +17,7 @@ static const double perpendicular = 1e-16;
 static const double parallel_sine2 = 1e-24;
 
 /* Error that the adaptive quadrature of two edges may have, over the product of their
- * lengths: a few roundings; tests/unit/test_polygon.c compares with exact values. */
+ * lengths: a few roundings; tests/unit/geometry/test_polygon.c compares with exact values. */
 static const double quadrature_error = 1e-15;
 
 double geo_contour_point(const double x[3], const double normal[3], int n, const double *v)
