@@ -9,10 +9,7 @@
 
 double aim_lobe_per_density(const struct aim_lobe *l, enum lobe_kind kind, double cos_i)
 {
-	return kind == LOBE_RECIPROCAL
-	     ? cos_i / fmax(cos_i, l->cosine)
-	     : cos_i / l->cosine * bsdf_lobe_table_normaliser(l->table, l->cosine) /
-	       bsdf_lobe_table_normaliser(l->table, cos_i);
+	return bsdf_lobe_table_weight(l->table, kind, l->cosine, cos_i);
 }
 
 double aim_lobe_density(const struct aim_lobe *l, enum lobe_kind kind, const double dir[3])

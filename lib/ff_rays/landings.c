@@ -7,8 +7,6 @@
 #include "lib/base/vec.h"
 #include "lib/data/landing.h"
 #include "lib/ff_rays/ray_samples.h"
-#include "lib/scatter/bsdf.h"
-#include "lib/scatter/lobe.h"
 #include "lib/scatter/lobe_table.h"
 
 /* Counts; guesses. EVENTS: mirrors, panes and lobes that a ray is followed through; what uneven
@@ -131,27 +129,14 @@ static void put(struct ff_landings *l, uint32_t column, const struct gathering *
 	l->count[place_of(l, column)] += g->copies;
 }
 
-/* A direction of a lobe in place of its axis, n on the side that the ray goes off to, and the
- * weight of light from there: (3) with N_k of where it comes from, over the density of the sample;
- * bsdf.h. 0 below the horizon. */
+/* A direction of a lobe in place of its axis, n on the side that the ray goes off to; its weight. */
 static double scatter(const struct ff_landings *l, uint32_t slot, const double n[3], double cos_o,
                       struct rng *random, double dir[3])
 {
 	double axis[3] = { dir[0], dir[1], dir[2] };
 	double u[2] = { rng_uniform(random), rng_uniform(random) };
-	const struct lobe_table *table = &l->table[slot];
-	int whole = l->job->m->lobe == LOBE_RECIPROCAL;
 
-	if (whole)
-		bsdf_lobe_sample_whole(table->k, axis, u, dir);
-	else
-		bsdf_lobe_sample(table->k, axis, n, u, dir);
-	double cos_i = v3_dot(n, dir);
-	if (!(cos_i > 0))
-		return 0;
-	return whole ? cos_i / fmax(cos_i, cos_o)
-	             : cos_i / cos_o * bsdf_lobe_table_normaliser(table, cos_o) /
-	               bsdf_lobe_table_normaliser(table, cos_i);
+	return bsdf_lobe_table_sample(&l->table[slot], l->job->m->lobe, axis, n, cos_o, u, dir);
 }
 
 /* The events by which light can have come that leaves a side towards the ray, at most two. */

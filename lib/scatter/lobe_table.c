@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "lib/base/vec.h"
 #include "lib/scatter/lobe.h"
 
 /* An exponent: lobes of smaller ones have a normaliser that is not smooth at cosine 1, where it
@@ -41,4 +42,24 @@ double bsdf_lobe_table_normaliser(const struct lobe_table *t, double cos_theta)
 	/* The cubic through four values (Lagrange). */
 	return (-p[0] * u * (u - 1) * (u - 2) + 3 * p[1] * (u + 1) * (u - 1) * (u - 2) -
 	        3 * p[2] * (u + 1) * u * (u - 2) + p[3] * (u + 1) * u * (u - 1)) / 6;
+}
+
+double bsdf_lobe_table_weight(const struct lobe_table *t, enum lobe_kind kind, double cos_o,
+                              double cos_i)
+{
+	return kind == LOBE_RECIPROCAL
+	     ? cos_i / fmax(cos_i, cos_o)
+	     : cos_i / cos_o * bsdf_lobe_table_normaliser(t, cos_o) /
+	       bsdf_lobe_table_normaliser(t, cos_i);
+}
+
+double bsdf_lobe_table_sample(const struct lobe_table *t, enum lobe_kind kind, const double axis[3],
+                              const double n[3], double cos_o, const double u[2], double out[3])
+{
+	if (kind == LOBE_RECIPROCAL)
+		bsdf_lobe_sample_whole(t->k, axis, u, out);
+	else
+		bsdf_lobe_sample(t->k, axis, n, u, out);
+	double cos_i = v3_dot(n, out);
+	return cos_i > 0 ? bsdf_lobe_table_weight(t, kind, cos_o, cos_i) : 0;
 }

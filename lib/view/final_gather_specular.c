@@ -52,28 +52,17 @@ static int choose(const struct view_side *s, int bands, int side, struct gather_
 	return rng_uniform(&g->random) < follow;
 }
 
-/* A direction of a lobe in place of its axis; 0 if it is below the horizon. Weights as in
- * lobe_weight.c. */
+/* A direction of a lobe in place of its axis; 0 if it is below the horizon. */
 static int scatter(const struct view_lobe *lobe, enum lobe_kind kind, int bands,
                    const double normal[3], double cos_o, struct gather_going *g, double dir[3])
 {
 	double axis[3] = { dir[0], dir[1], dir[2] };
 	double u[2] = { rng_uniform(&g->random), rng_uniform(&g->random) };
+	double weight = bsdf_lobe_table_sample(&lobe->table, kind, axis, normal, cos_o, u, dir);
 
-	if (kind == LOBE_RECIPROCAL)
-		bsdf_lobe_sample_whole(lobe->k, axis, u, dir);
-	else
-		bsdf_lobe_sample(lobe->k, axis, normal, u, dir);
-	double cos_i = v3_dot(normal, dir);
-	if (!(cos_i > 0))
-		return 0;
-	double weight = kind == LOBE_RECIPROCAL
-	              ? cos_i / fmax(cos_i, cos_o)
-	              : cos_i / cos_o * bsdf_lobe_table_normaliser(&lobe->table, cos_o) /
-	                bsdf_lobe_table_normaliser(&lobe->table, cos_i);
 	for (int b = 0; b < bands; b++)
 		g->weight[b] *= weight;
-	return 1;
+	return weight > 0;
 }
 
 /* The point that a ray of a batch met, off its surface along the normal. */
