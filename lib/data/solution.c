@@ -6,8 +6,8 @@
 #include "lib/base/mem.h"
 #include "lib/base/channels.h"
 
-double solution_exitance(const struct model *m, const struct solution *s,
-                         size_t element_side, int band)
+double solution_scattered(const struct model *m, size_t element_side, int band, double here_h,
+                          double there_h)
 {
 	const struct materials *mt = &m->material;
 	uint32_t material = model_patch_material(m, m->element.patch[element_side >> 1]);
@@ -17,10 +17,15 @@ double solution_exitance(const struct model *m, const struct solution *s,
 
 	/* A black back gives nothing back and lets nothing through. */
 	if (mt->one_sided[material])
-		return side == BACK ? 0 :
-		       mt->rho_d[here] * solution_irradiance(s, element_side, band);
-	return mt->rho_d[here] * solution_irradiance(s, element_side, band) +
-	       mt->tau_d[there] * solution_irradiance(s, element_side ^ 1, band);
+		return side == BACK ? 0 : mt->rho_d[here] * here_h;
+	return mt->rho_d[here] * here_h + mt->tau_d[there] * there_h;
+}
+
+double solution_exitance(const struct model *m, const struct solution *s,
+                         size_t element_side, int band)
+{
+	return solution_scattered(m, element_side, band, solution_irradiance(s, element_side, band),
+	                          solution_irradiance(s, element_side ^ 1, band));
 }
 
 static int check_sizes(const struct model *m, const struct solution *s, struct err *e)

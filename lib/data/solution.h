@@ -94,7 +94,10 @@ static inline double solution_irradiance(const struct solution *s, size_t elemen
 }
 
 /* Diffuse exitance without emission of an element-side,
- * M = rho_d H(this side) + tau_d(other side) H(other side). */
+ * M = rho_d H(this side) + tau_d(other side) H(other side); of two given irradiances, and of those of
+ * a solution. */
+double solution_scattered(const struct model *m, size_t element_side, int band, double here_h,
+                          double there_h);
 double solution_exitance(const struct model *m, const struct solution *s,
                          size_t element_side, int band);
 

@@ -49,8 +49,13 @@ static void look(struct ff_thread *t, uint32_t ps, uint32_t i)
 			t->pilot_sum[t->cube.item[k]][i] += j->grid.delta[k];
 }
 
-/* Squared difference of weight w of a row from the pilots' p, less their own variance. */
-static double off_by(double w, const double p[FF_PILOTS])
+/* Weight w of a row beside the pilots' p: the squared difference from their mean, and that less the
+ * variance of the mean. */
+struct difference {
+	double square, off;
+};
+
+static struct difference differ(double w, const double p[FF_PILOTS])
 {
 	double mean = 0, spread = 0;
 
@@ -58,16 +63,8 @@ static double off_by(double w, const double p[FF_PILOTS])
 		mean += p[i] / FF_PILOTS;
 	for (int i = 0; i < FF_PILOTS; i++)
 		spread += (p[i] - mean) * (p[i] - mean);
-	return (w - mean) * (w - mean) - spread / (FF_PILOTS * (FF_PILOTS - 1));
-}
-
-static double square_of(double w, const double p[FF_PILOTS])
-{
-	double mean = 0;
-
-	for (int i = 0; i < FF_PILOTS; i++)
-		mean += p[i] / FF_PILOTS;
-	return (w - mean) * (w - mean);
+	double square = (w - mean) * (w - mean);
+	return (struct difference){ square, square - spread / (FF_PILOTS * (FF_PILOTS - 1)) };
 }
 
 /* Sums over elements: the two above over the area, and the variance over the area if the row were
@@ -87,15 +84,17 @@ static void side_error(struct ff_thread *t, uint32_t target, struct row_error *r
 	for (uint32_t at = first; at < end; at++) {
 		uint32_t column = y->places->column[at];
 		double *p = t->pilot_sum[column], w = y->dense[at], area = m->element.area[column >> 1];
-		r->off += off_by(w, p) / area;
-		r->square += square_of(w, p) / area;
+		struct difference d = differ(w, p);
+		r->off += d.off / area;
+		r->square += d.square / area;
 		r->one += w / area;
 		sum += w;
 		for (int i = 0; i < FF_PILOTS; i++)
 			all[i] += p[i];
 		memset(p, 0, FF_PILOTS * sizeof *p);
 	}
-	y->variance[target] = fmax(off_by(sum, all), left_at_least * square_of(sum, all));
+	struct difference d = differ(sum, all);
+	y->variance[target] = fmax(d.off, left_at_least * d.square);
 }
 
 void ff_hemicube_pilot(struct ff_thread *t, uint32_t ps)
@@ -117,8 +116,9 @@ void ff_hemicube_pilot(struct ff_thread *t, uint32_t ps)
 		if (item == HEMICUBE_VOID)
 			continue;
 		double *p = t->pilot_sum[item], area = j->m->element.area[item >> 1];
-		r.off += off_by(0, p) / area;
-		r.square += square_of(0, p) / area;
+		struct difference d = differ(0, p);
+		r.off += d.off / area;
+		r.square += d.square / area;
 		memset(p, 0, FF_PILOTS * sizeof *p);
 	}
 	double off = fmax(r.off, left_at_least * r.square);

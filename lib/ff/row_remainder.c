@@ -47,10 +47,7 @@ void ff_remainder_cast(struct ff_rest *r, const struct ff_job *j, uint32_t ps, u
 		for (uint32_t first = 0; first < rays / FF_REPLICATES; first += RAY_BATCH) {
 			uint32_t left = rays / FF_REPLICATES - first, n = left < RAY_BATCH ? left : RAY_BATCH;
 			ff_rays_numbers(&j->of_rows, s.seed, first, n, &b);
-			ff_rays_elements(j, ps >> 1, n, &b);
-			ff_rays_origins(j, (int)(ps & 1), n, &b);
-			ff_rays_directions(j, (int)(ps & 1), n, &b);
-			ff_rays_cast(j, n, &b);
+			ff_rays_from_patch(j, ps, n, &b);
 			count(r, j, k, n, &b);
 		}
 	}

@@ -194,10 +194,12 @@ void ff_follow_on(struct ff_thread *t, const double org[3], const double dir[3],
 
 /* ---- many from one side ---- */
 
-/* Directions of an emission lobe about the normal instead of Lambertian ones. */
-static void lobe_directions(const struct ff_job *j, uint32_t ps, double exponent, uint32_t n,
-                            struct ff_ray_batch *b)
+/* As ff_rays_from_patch, with directions of an emission lobe about the normal. */
+static void rays_of_lobe(const struct ff_job *j, uint32_t ps, double exponent, uint32_t n,
+                         struct ff_ray_batch *b)
 {
+	ff_rays_elements(j, ps >> 1, n, b);
+	ff_rays_origins(j, (int)(ps & 1), n, b);
 	for (uint32_t i = 0; i < n; i++) {
 		double normal[3], dir[3], u[2] = { (double)b->u[2][i], (double)b->u[3][i] };
 		ff_normal(j, b->element[i], (int)(ps & 1), normal);
@@ -205,6 +207,7 @@ static void lobe_directions(const struct ff_job *j, uint32_t ps, double exponent
 		for (int k = 0; k < 3; k++)
 			b->ray.dir[k][i] = (float)dir[k];
 	}
+	ff_rays_cast(j, n, b);
 }
 
 static void world_ray(const struct ff_job *j, const struct ff_ray_batch *b, uint32_t i,
@@ -278,13 +281,10 @@ void ff_cast_side(struct ff_thread *t, uint32_t ps, uint32_t count, double expon
 		for (uint32_t first = 0; first < each; first += RAY_BATCH) {
 			uint32_t n = each - first < RAY_BATCH ? each - first : RAY_BATCH;
 			ff_rays_numbers(&j->of_rows, s.seed, first, n, &b);
-			ff_rays_elements(j, ps >> 1, n, &b);
-			ff_rays_origins(j, (int)(ps & 1), n, &b);
 			if (exponent < 0)
-				ff_rays_directions(j, (int)(ps & 1), n, &b);
+				ff_rays_from_patch(j, ps, n, &b);
 			else
-				lobe_directions(j, ps, exponent, n, &b);
-			ff_rays_cast(j, n, &b);
+				rays_of_lobe(j, ps, exponent, n, &b);
 			batch_land(t, (int)(ps & 1), n, &b, 1);
 		}
 		ff_tally_replicate(&t->tally);
@@ -294,12 +294,7 @@ void ff_cast_side(struct ff_thread *t, uint32_t ps, uint32_t count, double expon
 static void send_batch(struct ff_thread *t, uint32_t ps, uint32_t *n, struct ff_ray_batch *b,
                        uint32_t weight)
 {
-	const struct ff_job *j = t->job;
-
-	ff_rays_elements(j, ps >> 1, *n, b);
-	ff_rays_origins(j, (int)(ps & 1), *n, b);
-	ff_rays_directions(j, (int)(ps & 1), *n, b);
-	ff_rays_cast(j, *n, b);
+	ff_rays_from_patch(t->job, ps, *n, b);
 	batch_land(t, (int)(ps & 1), *n, b, weight);
 	*n = 0;
 }

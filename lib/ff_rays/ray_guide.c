@@ -66,10 +66,7 @@ void ff_guide_learn(struct ff_thread *t, uint32_t ps, uint32_t rays, struct ff_g
 		ff_rays_numbers(&j->of_rows, s.seed, first, n, &b);
 		for (uint32_t i = 0; i < n; i++)
 			cell[i] = cell_of(&b, i);
-		ff_rays_elements(j, ps >> 1, n, &b);
-		ff_rays_origins(j, (int)(ps & 1), n, &b);
-		ff_rays_directions(j, (int)(ps & 1), n, &b);
-		ff_rays_cast(j, n, &b);
+		ff_rays_from_patch(j, ps, n, &b);
 		for (uint32_t i = 0; i < n; i++)
 			if (b.ray.triangle[i] != RAY_MISS &&
 			    j->is_ideal[2 * j->m->element.patch[b.hit[i]] + b.ray.side[i]])

@@ -255,6 +255,14 @@ void ff_rays_cast(const struct ff_job *j, uint32_t n, struct ff_ray_batch *b)
 		b->hit[i] = ray_locate_below(l, *way[i], b->ray.w[0][i], b->ray.w[1][i]);
 }
 
+void ff_rays_from_patch(const struct ff_job *j, uint32_t ps, uint32_t n, struct ff_ray_batch *b)
+{
+	ff_rays_elements(j, ps >> 1, n, b);
+	ff_rays_origins(j, (int)(ps & 1), n, b);
+	ff_rays_directions(j, (int)(ps & 1), n, b);
+	ff_rays_cast(j, n, b);
+}
+
 void ff_rays_from_element(const struct ff_job *j, const struct ff_samples *s,
                           const uint32_t seed[4], uint32_t column, uint32_t first,
                           uint32_t n, struct ff_ray_batch *b)

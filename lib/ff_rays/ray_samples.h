@@ -38,7 +38,12 @@ void ff_rays_directions(const struct ff_job *j, int side, uint32_t n,
 /* Casts n rays and finds the elements where they land. */
 void ff_rays_cast(const struct ff_job *j, uint32_t n, struct ff_ray_batch *b);
 
-/* The same from one element-side: rays first to first + n of a replicate. */
+/* The n rays of numbers that the batch has, from a patch-side: elements, origins, Lambertian
+ * directions, and cast. */
+void ff_rays_from_patch(const struct ff_job *j, uint32_t patch_side, uint32_t n,
+                        struct ff_ray_batch *b);
+
+/* The same from one element-side, with their numbers: rays first to first + n of a replicate. */
 void ff_rays_from_element(const struct ff_job *j, const struct ff_samples *s,
                           const uint32_t seed[4], uint32_t column, uint32_t first,
                           uint32_t n, struct ff_ray_batch *b);

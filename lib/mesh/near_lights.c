@@ -12,6 +12,7 @@
 #include "lib/geometry/box_tree.h"
 #include "lib/geometry/half_edge.h"
 #include "lib/mesh/stages.h"
+#include "lib/scatter/bsdf.h"
 
 /* The longest edge over d^2 / h. A guess; tests/bench/uneven.py shows what it does where lamps
  * stand close to walls. */
@@ -32,16 +33,6 @@ struct sources {
 	double (*normal)[3];      /* [n] unit, of the side that emits; 0: all around */
 	struct boxes boxes;
 };
-
-static int emits(const struct model *m, uint32_t material, int side)
-{
-	size_t at = model_material_at(&m->material, material, side);
-
-	for (int k = 0; k < m->bands && !(side == BACK && m->material.one_sided[material]); k++)
-		if (m->material.emission[at + (size_t)k] > 0)
-			return 1;
-	return 0;
-}
 
 static uint32_t material_of(const struct model *m, size_t triangle)
 {
@@ -80,7 +71,7 @@ static int is_outline(const struct model *m, const struct half_edges *g, uint32_
 		unit_normal(m, other / 3, o);
 		int same = geo_half_edge_from(m->triangle.corner, other) !=
 		           geo_half_edge_from(m->triangle.corner, h);
-		if (emits(m, material_of(m, other / 3), same ? side : !side) &&
+		if (bsdf_emits(&m->material, material_of(m, other / 3), same ? side : !side) &&
 		    (same ? 1 : -1) * v3_dot(n, o) > one_plane)
 			return 0;
 	}
@@ -94,7 +85,7 @@ static void add_triangle(const struct model *m, const struct half_edges *g, uint
 
 	for (int side = 0; side < 2; side++) {
 		double n[3];
-		if (!emits(m, material_of(m, t), side))
+		if (!bsdf_emits(&m->material, material_of(m, t), side))
 			continue;
 		unit_normal(m, t, n);
 		for (int k = 0; k < 3; k++)
@@ -115,7 +106,7 @@ static size_t count_sources(const struct model *m)
 
 	for (size_t t = 0; t < m->triangle.n; t++)
 		for (int side = 0; side < 2; side++)
-			n += emits(m, material_of(m, t), side) ? 3 : 0;
+			n += bsdf_emits(&m->material, material_of(m, t), side) ? 3 : 0;
 	return n;
 }
 

@@ -108,23 +108,14 @@ static double irradiance(const struct uneven *u, size_t es, size_t channel)
 static void set_exitance(void *arg, size_t begin, size_t end, int thread)
 {
 	const struct uneven *u = arg;
-	const struct model *m = u->t->m;
-	const struct materials *mt = &m->material;
-	size_t bands = (size_t)u->s->bands;
 
 	(void)thread;
 	for (size_t es = begin; es < end; es++) {
-		uint32_t ps = 2 * m->element.patch[es >> 1] + (uint32_t)(es & 1);
-		uint32_t material = model_patch_material(m, ps >> 1);
-		size_t here = model_material_at(mt, material, (int)(es & 1));
-		size_t there = model_material_at(mt, material, !(es & 1));
 		lanes x = { 0 };
-		for (size_t k = 0; model_side_modelled(m, ps) && k < LANES &&
-		     u->first + k < channels_of(u); k++) {
-			size_t c = u->first + k, band = c % bands;
-			x[k] = mt->rho_d[here + band] * irradiance(u, es, c);
-			if (!mt->one_sided[material])
-				x[k] += mt->tau_d[there + band] * irradiance(u, es ^ 1, c);
+		for (size_t k = 0; k < LANES && u->first + k < channels_of(u); k++) {
+			size_t c = u->first + k;
+			x[k] = solution_scattered(u->t->m, es, (int)(c % (size_t)u->s->bands),
+			                          irradiance(u, es, c), irradiance(u, es ^ 1, c));
 		}
 		u->exitance[es] = x;
 	}
