@@ -54,6 +54,7 @@ struct gatherer {
 	uint32_t *pairs_of;          /* [2E] pairs of an element-side, by place */
 	struct ff_landings *landings; /* of patches [begin, end) */
 	uint32_t begin, end;
+	int useful;                /* rows are made of pairs, too; else landings alone are kept */
 	double *rays;              /* [threads] cast */
 	struct err *err;           /* [threads] */
 };
@@ -118,7 +119,7 @@ static void gather_element(struct gatherer *g, uint32_t patch, uint32_t column, 
 		uint32_t source = ((uint32_t *)met->data)[i];
 		struct pair p = { source, g->hits[thread][source] };
 		g->hits[thread][source] = 0;
-		if (!g->job->is_ideal[ps])
+		if (g->useful && !g->job->is_ideal[ps])
 			mem_append(&g->pairs[patch], &p, 1, sizeof p, &g->err[thread]);
 	}
 }
@@ -279,11 +280,12 @@ int ff_reciprocal_cast(struct ff_job *j, uint32_t begin, uint32_t end, double *r
 	size_t threads = j->o.threads > 0 ? (size_t)j->o.threads : 1;
 	struct gatherer g = { .job = j, .to = &j->reciprocal, .landings = &j->landings,
 	                      .begin = begin, .end = j->o.to_patches ? begin : end };
-	int useful = j->o.method != FF_HEMICUBE && (any_takes(j) || any_by_formula(j)), bad;
+	int bad;
 
-	if (!useful && j->o.to_patches)
+	g.useful = j->o.method != FF_HEMICUBE && (any_takes(j) || any_by_formula(j));
+	if (!g.useful && j->o.to_patches)
 		return 0;
-	bad = ff_landings_init(&j->landings, j, e) || allocate(&g, threads, e);
+	bad = (!j->o.to_patches && ff_landings_init(&j->landings, j, e)) || allocate(&g, threads, e);
 	if (!bad) {
 		par_for(j->m->patch.n, 1, (int)threads, gather_patches, &g, progress);
 		bound_patches(j, j->reciprocal.centre);
@@ -294,9 +296,9 @@ int ff_reciprocal_cast(struct ff_job *j, uint32_t begin, uint32_t end, double *r
 		if (g.err[t].set)
 			bad = err_set(e, "%s", g.err[t].text);
 	}
-	bad = bad || transpose(&g, e);
+	bad = bad || (g.useful && transpose(&g, e));
 	release(&g, threads);
-	j->reciprocal.rays = bad || !useful ? 0 : j->o.gather;
+	j->reciprocal.rays = bad || !g.useful ? 0 : j->o.gather;
 	return bad ? -1 : 0;
 }
 

@@ -13,6 +13,10 @@ static const double same_face = .93969262078590838;
 enum { NEIGHBOURS_LEAST = 3 };
 static const double narrow = 1e-3;
 
+/* Elements about a vertex, a count: one with more is the hub of a fan, which all would look at in
+ * turn; the two others of an element tell of its neighbours. A guess; bisection leaves a dozen. */
+enum { HUB = 256 };
+
 int radiosity_neighbours_init(struct neighbours *n, const struct model *m, struct err *e)
 {
 	const struct mem_array array[] = {
@@ -84,6 +88,8 @@ void radiosity_exitance_slope(const struct neighbours *n, const lanes *value, ui
 	slope[0] = slope[1] = (lanes){ 0 };
 	for (int c = 0; c < 3; c++) {
 		uint32_t v = m->element.corner[3 * (size_t)element + (size_t)c];
+		if (n->start[v + 1] - n->start[v] > HUB)
+			continue;
 		for (uint64_t i = n->start[v]; i < n->start[v + 1]; i++) {
 			uint32_t other = n->element[i];
 			double d[3];
