@@ -15,7 +15,6 @@
 #include "lib/radiosity/light_groups.h"
 #include "lib/radiosity/radiosity.h"
 #include "lib/radiosity/transport.h"
-#include "lib/radiosity/uneven.h"
 #include "tools/common/cli.h"
 #include "tools/common/key.h"
 
@@ -330,33 +329,10 @@ static double ledger_of(const struct solution *s, int term, int band)
 	return sum;
 }
 
-/* What was made up for, root mean square over area and bands, over the mean irradiance. */
-static double uneven_part(const struct job *j)
-{
-	const struct solution *s = &j->s;
-	size_t bands = (size_t)s->bands;
-	double square = 0, all = 0, area = 0;
-
-	for (size_t es = 0; es < s->element_sides; es++) {
-		double a = j->m.element.area[es >> 1];
-		if (!model_side_modelled(&j->m, 2 * j->m.element.patch[es >> 1] + (uint32_t)(es & 1)))
-			continue;
-		for (size_t k = 0; k < bands; k++) {
-			double u = 0;
-			for (size_t g = 0; g < s->groups; g++)
-				u += (double)s->uneven[(g * s->element_sides + es) * bands + k];
-			square += a * u * u;
-			all += a * solution_irradiance(s, es, (int)k);
-			area += a;
-		}
-	}
-	return all > 0 ? sqrt(square * area) / all : 0;
-}
-
 static char *report_text(const struct job *j)
 {
 	const struct radiosity_report *r = &j->report;
-	int known = radiosity_uneven_known(&j->t);
+	const int known = !isnan(r->uneven);
 	json_t *ledger = json_object(), *o;
 	char *text;
 
@@ -372,7 +348,7 @@ static char *report_text(const struct job *j)
 	              "guessed_directions", r->guessed, "ledger_residual", number(r->residual),
 	              "mean_error", solution_mean_error(&j->m, &j->s),
 	              "sampling", solution_relative_rms(&j->m, &j->s, j->s.error.sampling),
-	              "uneven", known ? json_real(uneven_part(j)) : json_null(),
+	              "uneven", known ? json_real(r->uneven) : json_null(),
 	              "uneven_left", known ? json_real(solution_relative_rms(&j->m, &j->s, j->s.error.uneven))
 	                                   : json_null(),
 	              "discretisation", solution_relative_rms(&j->m, &j->s, j->s.error.discretisation));
@@ -396,9 +372,9 @@ static void print_errors(const struct job *j, FILE *out)
 	fprintf(out, "sampling      %.3g relative standard error of irradiance, mean over area; "
 	        "%.3g rms\n", solution_mean_error(&j->m, s),
 	        solution_relative_rms(&j->m, s, s->error.sampling));
-	if (radiosity_uneven_known(&j->t))
+	if (!isnan(j->report.uneven))
 		fprintf(out, "uneven        %.3g of irradiance made up for patches that are not evenly lit; "
-		        "%.3g left (estimate), rms\n", uneven_part(j),
+		        "%.3g left (estimate), rms\n", j->report.uneven,
 		        solution_relative_rms(&j->m, s, s->error.uneven));
 	else
 		fprintf(out, "uneven        not known: no elements gathered\n");

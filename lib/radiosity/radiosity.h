@@ -81,6 +81,8 @@ struct radiosity_report {
 	double bound;          /* certified: sum over elements of area |H - H*| from
 	                          unshot flux, over emitted flux; INFINITY = no finite bound */
 	double guessed;        /* flux that used a link of another source, over emitted */
+	double uneven;         /* what uneven patches added to irradiance, root mean square over its
+	                          mean; NAN: not known (uneven.h). Of radiosity_solve */
 	double solve_bytes;    /* of form factors read by shots and bound: runs */
 	double element_bytes;   /* and by the pass over elements: columns and values */
 };

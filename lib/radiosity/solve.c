@@ -1,5 +1,6 @@
 /* The whole of pass 1: shooting, irradiance of elements, and what uneven patches do to it. */
 #include <math.h>
+#include <stdlib.h>
 
 #include "lib/base/mem.h"
 #include "lib/data/solution.h"
@@ -73,6 +74,22 @@ static int correct(struct uneven *u, const struct radiosity_options *o,
 	return 0;
 }
 
+/* What was put right, all groups together. */
+static int tell_uneven(const struct model *m, const struct solution *s, struct radiosity_report *r,
+                       struct err *e)
+{
+	size_t n = s->element_sides * (size_t)s->bands;
+	double *sum = mem_new(n, sizeof *sum, "irradiance", e);
+
+	if (!sum)
+		return -1;
+	for (size_t i = 0; i < s->groups * n; i++)
+		sum[i % n] += (double)s->uneven[i];
+	r->uneven = solution_relative_rms(m, s, sum);
+	free(sum);
+	return 0;
+}
+
 int radiosity_solve(struct solution *s, const struct transport *t, const struct radiosity_options *o,
                     const struct radiosity_hooks *hooks, struct radiosity_report *r, struct err *e)
 {
@@ -82,12 +99,16 @@ int radiosity_solve(struct solution *s, const struct transport *t, const struct 
 	if (radiosity_shoot(s, t, o, hooks, r, e) ||
 	    radiosity_element_irradiance(s, t, o->threads, r, e))
 		return -1;
-	if (!radiosity_uneven_known(t) || r->unshot > o->stop)
+	if (!radiosity_uneven_known(t)) {
+		r->uneven = (double)NAN;
 		return 0;
+	}
+	if (r->unshot > o->stop)
+		return tell_uneven(t->m, s, r, e);
 	int bad = radiosity_uneven_init(&u, t, s, o->threads, e) ||
 	          correct(&u, o, hooks, r, &left, e);
 	if (!bad)
 		radiosity_uneven_errors(&u, left);
 	radiosity_uneven_free(&u);
-	return bad ? -1 : 0;
+	return bad || tell_uneven(t->m, s, r, e) ? -1 : 0;
 }

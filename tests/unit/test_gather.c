@@ -34,16 +34,9 @@ static void make(struct model *m, double emission, int shelf)
 		make_room(m);
 	} else { /* a plate above half of the floor, seen from both sides */
 		begin(m, 7, 0);
-		struct model room;
-		make_room(&room);
-		for (size_t i = 0; i < room.vertices; i++)
-			mesh_add_vertex(m, room.vertex[3 * i], room.vertex[3 * i + 1], room.vertex[3 * i + 2]);
-		for (size_t i = 0; i < room.triangle.n; i++)
-			add_triangle(m, room.triangle.corner[3 * i], room.triangle.corner[3 * i + 1],
-			             room.triangle.corner[3 * i + 2], room.triangle.surface[i]);
+		add_room(m);
 		add_rectangle(m, (double[]){ .1, .2, .4 }, (double[]){ .5, 0, 0 },
 		              (double[]){ 0, .6, 0 }, SHELF);
-		model_free(&room);
 	}
 	m->material.emission[2 * CEILING] = emission;
 	mesh(m, shelf ? sizes(.35, .12, 0) : sizes(.2, .07, 0));

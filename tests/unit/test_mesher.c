@@ -407,16 +407,9 @@ static void test_near_lamp(void **state)
 
 	(void)state;
 	for (int lit = 0; lit < 3; lit++) { /* by none, this side, the other */
-		struct model m, room;
-		make_room(&room);
+		struct model m;
 		begin(&m, 7, 1);
-		for (size_t i = 0; i < room.vertices; i++)
-			mesh_add_vertex(&m, room.vertex[3 * i], room.vertex[3 * i + 1],
-			                room.vertex[3 * i + 2]);
-		for (size_t i = 0; i < room.triangle.n; i++)
-			add_triangle(&m, room.triangle.corner[3 * i], room.triangle.corner[3 * i + 1],
-			             room.triangle.corner[3 * i + 2], room.triangle.surface[i]);
-		model_free(&room);
+		add_room(&m);
 		add_rectangle(&m, (double[]){ .05, .1, .1 }, (double[]){ 0, 0, .8 },
 		              (double[]){ 0, .8, 0 }, 6);
 		m.material.one_sided[6] = 0;

@@ -14,17 +14,10 @@ enum kind { PLAIN, TRANSLUCENT, MIRROR, PANE, GLOSSY, KINDS };
  * `kind` says. */
 static void make(struct model *m, enum kind kind, double patch)
 {
-	struct model room;
 	struct mesh_options o = sizes(patch, .1, 0);
 
-	make_room(&room);
 	begin(m, SURFACES, 1);
-	for (size_t i = 0; i < room.vertices; i++)
-		mesh_add_vertex(m, room.vertex[3 * i], room.vertex[3 * i + 1], room.vertex[3 * i + 2]);
-	for (size_t i = 0; i < room.triangle.n; i++)
-		add_triangle(m, room.triangle.corner[3 * i], room.triangle.corner[3 * i + 1],
-		             room.triangle.corner[3 * i + 2], room.triangle.surface[i]);
-	model_free(&room);
+	add_room(m);
 	add_rectangle(m, (double[]){ .1, .2, .6 }, (double[]){ 0, 0, .2 }, (double[]){ 0, .6, 0 }, LAMP);
 	add_rectangle(m, (double[]){ .5, .1, .1 }, (double[]){ 0, .8, 0 }, (double[]){ 0, 0, .5 }, PANEL);
 	m->material.emission[2 * LAMP] = 1;

@@ -377,7 +377,7 @@ static void test_exchange(void **state)
 			if ((k + i) & 1)
 				random_box(&l.m, &d, at, .5, 0, ALL_FACES);
 			else
-				random_plate(&l.m, &d, at, .7);
+				random_plate(&l.m, &d, at, .7, roll(&d, 0, 1) < .3);
 		}
 		assert_int_equal(scene_end(&l.m), 0);
 		ready(&l, 1e-6);
